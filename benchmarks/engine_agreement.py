@@ -1,7 +1,7 @@
 """How far two engines agree about the same grasps, and where they do not.
 
     python benchmarks/engine_agreement.py [SCENE ...] [--engines standard mujoco] [--trials N]
-        [--station S] [--workers N]
+        [--station S] [--workers N] [--device D]
 
 Samples antipodal grasps on every object, and executes the clear ones with both engines, every
 second one with less friction, so that not all hold. An object that stands in several scenes is
@@ -9,6 +9,8 @@ tried with other grasps in each. Two verdicts are alike if both hold the target 
 neither does. Tables show what is alike by object, by the phase in which each engine loses the
 target, by the outcomes of both, and by the margins of the first engine: what slipped or tilted
 much, or is pressed little, is contested. The grasps on which the engines differ are listed.
+
+An engine with parallel trials runs on a card, or with --device cpu without one.
 """
 
 from __future__ import annotations
@@ -26,8 +28,8 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
-from burg_drake.core import wilson_interval
-from burg_drake.simulation import TrialResult, hand_trial_of
+from burg_drake.core import Array, wilson_interval
+from burg_drake.simulation import BatchTrial, MujocoTrial, TrialResult, hand_trial_of
 from burg_drake.station import ENGINES
 
 ENOUGH = 0.95
@@ -81,6 +83,7 @@ class Share:
         count: grasps of the instance.
         skip: leave out so many clear ones first.
         part, parts: every so many of them, from that one on.
+        device: of an engine with parallel trials.
     """
 
     scene: str
@@ -91,6 +94,7 @@ class Share:
     skip: int
     part: int
     parts: int
+    device: str | None
 
 
 def main() -> None:
@@ -105,6 +109,7 @@ def main() -> None:
     parser.add_argument("--station", default="panda_tabletop")
     parser.add_argument("--trials", type=int, default=1300, help="at most, in all")
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--device", help="of an engine with parallel trials")
     arguments = parser.parse_args()
     engines = (arguments.engines[0], arguments.engines[1])
     placed = [(s, name) for s in arguments.scenes for name in burg.load_scene(s).instances]
@@ -114,8 +119,9 @@ def main() -> None:
     for scene, name in placed:
         skip = each * seen[name]
         seen[name] += 1
+        where = (scene, arguments.station, name, engines, each, skip)
         shares += [
-            Share(scene, arguments.station, name, engines, each, skip, part, arguments.workers)
+            Share(*where, part, arguments.workers, arguments.device)
             for part in range(arguments.workers)
         ]
     pairs: list[Pair] = []
@@ -128,22 +134,48 @@ def main() -> None:
 def execute(share: Share) -> list[Pair]:
     """Executes a share of the grasps on one object."""
     scene, station = burg.load_scene(share.scene), hand_only(burg.load_station(share.station))
-    trials = [hand_trial_of(scene, station, name) for name in share.engines]
     name = share.instance
-    grasps = clear_grasps(trials[0], name, share.skip + share.count)[share.skip :]
-    coefficients = frictions(scene, name, len(grasps))
-    tried = list(zip(range(len(grasps)), grasps, coefficients, strict=True))
-    pairs = []
-    for number, X_OG, friction in tried[share.part :: share.parts]:
-        results, seconds = [], []
-        for trial in trials:
-            start = time.process_time()
-            results.append(trial.run(name, X_OG, friction=float(friction)))
-            seconds.append(time.process_time() - start)
-        label = f"{share.scene}/{name}"
-        both, cost = (results[0], results[1]), (seconds[0], seconds[1])
-        pairs.append(Pair(label, number, float(friction), both, cost))
-    return pairs
+    trial = hand_trial_of(scene, station, share.engines[0])
+    grasps = clear_grasps(trial, name, share.skip + share.count)[share.skip :]
+    numbers = np.arange(len(grasps))[share.part :: share.parts]
+    X_OG, friction = grasps[numbers], frictions(scene, name, len(grasps))[numbers]
+    columns = []
+    for engine in share.engines:
+        if ENGINES[engine].parallel:
+            batch = BatchTrial(scene, station, engine=engine, device=share.device)
+            columns.append(execute_all(batch, name, X_OG, friction))
+        else:
+            single = hand_trial_of(scene, station, engine)
+            columns.append(execute_each(single, name, X_OG, friction))
+    return [
+        Pair(f"{share.scene}/{name}", int(number), float(mu), (a[0], b[0]), (a[1], b[1]))
+        for number, mu, a, b in zip(numbers, friction, *columns, strict=True)
+    ]
+
+
+Timed = tuple[TrialResult, float]
+"""A result, and its CPU time [s]."""
+
+
+def execute_each(
+    trial: burg.HandTrial | MujocoTrial, name: str, X_OG: Array, friction: Array
+) -> list[Timed]:
+    """Executes grasps one by one."""
+    results = []
+    for X, mu in zip(X_OG, friction.tolist(), strict=True):
+        start = time.process_time()
+        results.append((trial.run(name, X, friction=mu), time.process_time() - start))
+    return results
+
+
+def execute_all(trial: BatchTrial, name: str, X_OG: Array, friction: Array) -> list[Timed]:
+    """Executes grasps in parallel; each gets an equal share of the CPU time."""
+    start = time.process_time()
+    results = trial.run(name, X_OG, friction=friction)
+    seconds = (time.process_time() - start) / max(1, len(results))
+    if trial.on_cpu:
+        print(f"{name}: {trial.on_cpu} of {len(results)} needed the complete world, on the CPU")
+    return [(result, seconds) for result in results]
 
 
 def report(pairs: Sequence[Pair], engines: tuple[str, str]) -> None:

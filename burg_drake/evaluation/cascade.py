@@ -31,6 +31,7 @@ from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
+from burg_drake.evaluation.judge import require_device
 from burg_drake.evaluation.many_scenes import evaluate_scenes
 from burg_drake.evaluation.part_store import keep_parts
 from burg_drake.evaluation.run_document import add_session, begin_session
@@ -49,7 +50,7 @@ from burg_drake.evaluation.run_preparation import (
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.evaluation.table_file import require_writer
 from burg_drake.scene import Scene, SceneLike, as_scene
-from burg_drake.station import StationLike, as_station
+from burg_drake.station import StationLike, as_engine, as_station
 
 
 @overload
@@ -145,6 +146,7 @@ def evaluate(
     station = as_station(station)
     if executor is None:
         executor = LocalExecutor.of_this_machine(workers)
+        require_device(as_engine(settings.engine), settings.device)
     elif workers is not None:
         raise InvalidInputError(
             "give either workers or an executor; an executor has workers of its own"

@@ -120,6 +120,8 @@ def _screen_batches(judge: Judge) -> tuple[int, ...]:
     return tuple(screen.batch for screen in judge.screens)
 
 
+GRASPS_PER_LIMIT = 1024
+"""Grasps screened at a time in the limits of `WorkerLimits`; more have in proportion more time."""
 GRASPS_PER_TASK = 4
 """Grasps handed out at a time: few, so that workers finish together."""
 
@@ -373,7 +375,9 @@ class JudgePool:
             return
         job.set_screens(self._screens[job.job.key])
         grasps, are_screened = job.next_work()
-        limit = TimeLimit(self.limits.cpu, self.limits.wall)
+        # Only trials are so many at a time.
+        share = max(1.0, len(grasps) / GRASPS_PER_LIMIT)
+        limit = TimeLimit(self.limits.cpu * share, self.limits.wall * share)
         if are_screened:
             work = AssignedWork(slot, job, grasps, screening=True)
             task: Task[Any] = Task(screen_grasps, (grasps,), {}, job.session, limit, retries=0)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -37,7 +38,13 @@ from burg_drake.station import DRAKE_ENGINES, Engine, GraspMotion, Station
 if TYPE_CHECKING:
     from burg_drake.grasping import HandClearance
     from burg_drake.motion import ArmReach, Reach, ReachSettings
-    from burg_drake.simulation import GraspTrial, TrialResult, TrialSettings
+    from burg_drake.simulation import (
+        GraspTrial,
+        HandTrial,
+        MujocoTrial,
+        TrialResult,
+        TrialSettings,
+    )
 
 
 def mode_for(station: Station, asked: Mode | None = None) -> Mode:
@@ -77,9 +84,29 @@ def require_engine_for(engine: Engine, mode: Mode) -> None:
             f" {engine.name} use mode reach, in which the hand alone executes what the"
             " arm can reach"
         ).about("mode")
-    from burg_drake.simulation import require_mujoco
+    from burg_drake.simulation import require_mujoco, require_warp
 
     require_mujoco()
+    if engine.parallel:
+        require_warp()
+
+
+def require_device(engine: Engine, device: str | None) -> None:
+    """Refuses a device that this machine does not have, or that has no effect.
+
+    Raises:
+        InvalidInputError: there is no such device, no card, or the engine does not need one.
+        MissingDependencyError: the engine is not installed.
+    """
+    if engine.parallel:
+        from burg_drake.simulation import find_devices
+
+        find_devices(device)
+    elif device is not None:
+        raise InvalidInputError(
+            f"device {device!r} has no effect with engine {engine.name}; leave it out, or give"
+            " engine mujoco-gpu"
+        ).about("device", "engine")
 
 
 def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
@@ -127,7 +154,10 @@ Decide = Callable[[Candidate, "ArmPath | Plan | None"], Decision]
 
 
 class Judge(Protocol):
-    """Stages in the order in which a grasp passes them; the last stage always decides."""
+    """Stages in the order in which a grasp passes them.
+
+    The last stage always decides, or the last screen if there is no stage.
+    """
 
     @property
     def screens(self) -> Sequence[Screen]:
@@ -174,18 +204,20 @@ def screen_grasps(
         grasps: grasps and the decisions on them so far; all have passed the same screens.
 
     Returns:
-        State of each grasp with the new decision. On an error each grasp is screened alone, and the
-        grasps that cause the error end in `simulation_failed`.
+        State of each grasp with the new decision. On an error each half is screened alone, and so
+        on; the grasps that cause the error end in `simulation_failed`.
     """
     if not grasps:
         return []
     screen = judge.screens[len(grasps[0][1].decisions)]
     start = time.process_time()
     try:
-        decisions = screen.ask([candidate for candidate, _ in grasps])
+        asked = [_with_found_lift(candidate, state.decisions) for candidate, state in grasps]
+        decisions = screen.ask(asked)
     except Exception as error:
         if len(grasps) > 1:
-            return [state for grasp in grasps for state in screen_grasps(judge, [grasp])]
+            half = len(grasps) // 2
+            return screen_grasps(judge, grasps[:half]) + screen_grasps(judge, grasps[half:])
         decisions = [Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))]
     share = (time.process_time() - start) / len(grasps)
     return [
@@ -311,11 +343,8 @@ def hand_screen(
     """
 
     def ask(grasps: Sequence[Candidate]) -> list[Decision]:
-        by_instance: dict[str, list[int]] = {}
-        for k, grasp in enumerate(grasps):
-            by_instance.setdefault(grasp.instance, []).append(k)
         decisions = [Decision()] * len(grasps)
-        for instance, chosen in by_instance.items():
+        for instance, chosen in rows_by_instance(grasps).items():
             X_WG = grasps_in_world([grasps[k] for k in chosen], X_WO)
             results = clearance.check_all(instance, X_WG)
             lifts = np.full(len(chosen), np.nan)
@@ -351,6 +380,14 @@ def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = Fa
         return [_reach_decision(result, motions) for result in results]
 
     return Screen(Stage.REACHABLE, ask, 128)  # as many as `ArmReach` judges together
+
+
+def rows_by_instance(grasps: Sequence[Candidate]) -> dict[str, list[int]]:
+    """Indices of grasps by the names of their targets."""
+    rows: dict[str, list[int]] = {}
+    for k, grasp in enumerate(grasps):
+        rows.setdefault(grasp.instance, []).append(k)
+    return rows
 
 
 def grasps_in_world(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
@@ -430,7 +467,10 @@ class StationJudge:
 
 
 class HandJudge(StationJudge):
-    """Executes grasps with the hand alone; in mode `reach` only grasps that the arm can execute."""
+    """Executes grasps with the hand alone; in mode `reach` only grasps that the arm can execute.
+
+    An engine with parallel trials takes many grasps at once, as a screen does, and decides each.
+    """
 
     def __init__(
         self,
@@ -440,12 +480,19 @@ class HandJudge(StationJudge):
         engine: Engine,
         mode: Literal["hand", "reach"],
         settings: TrialSettings,
+        device: str | None = None,
     ) -> None:
         """Builds the diagrams that all grasps share; see `build_judge`."""
-        from burg_drake.simulation import hand_trial_of
+        from burg_drake.simulation import BatchTrial, hand_trial_of
         from burg_drake.station import instance_pose
 
-        self._trial = hand_trial_of(scene, station, engine, settings=settings)
+        if engine.parallel:
+            self._batch = BatchTrial(
+                scene, station, engine=engine, settings=settings, device=device
+            )
+            self._trial: HandTrial | MujocoTrial = self._batch.single
+        else:
+            self._trial = hand_trial_of(scene, station, engine, settings=settings)
         motion = self._trial.motion
         X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
         shortened = mode == "hand" and motion.shortest < motion.lift_height
@@ -453,15 +500,50 @@ class HandJudge(StationJudge):
         screens = [hand_screen(self._trial.clearance, X_WO, free_lift)]
         if mode == "reach":
             screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
-        super().__init__(screens, [(Stage.EXECUTED, self._execute)], self._trial)
+        stages: list[tuple[Stage, Decide]] = [(Stage.EXECUTED, self._execute)]
+        if engine.parallel:
+            screens.append(Screen(Stage.EXECUTED, self._execute_all, self._batch.batch_size))
+            stages = []
+        super().__init__(screens, stages, self._trial)
 
     def _execute(self, grasp: Candidate, motion: ArmPath | Plan | None) -> Decision:
-        lift = self._trial.motion.lift_height if grasp.lift is None else grasp.lift
         result = self._trial.run(
-            grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass, lift=lift
+            grasp.instance,
+            grasp.X_OG,
+            friction=grasp.friction,
+            mass=grasp.mass,
+            lift=self._lift_of(grasp),
         )
+        return self._decision(grasp, result)
+
+    def _execute_all(self, grasps: Sequence[Candidate]) -> list[Decision]:
+        """Executes many grasps in parallel."""
+
+        def column(values: Iterable[float | None]) -> Array:
+            return np.array([math.nan if v is None else v for v in values])
+
+        decisions: list[Decision] = [Decision()] * len(grasps)
+        for instance, rows in rows_by_instance(grasps).items():
+            chosen = [grasps[k] for k in rows]
+            results = self._batch.run(
+                instance,
+                np.array([grasp.X_OG for grasp in chosen]),
+                friction=column(grasp.friction for grasp in chosen),
+                mass=column(grasp.mass for grasp in chosen),
+                lift=np.array([self._lift_of(grasp) for grasp in chosen]),
+                progress=partial(report_progress, Stage.EXECUTED),
+            )
+            for k, grasp, result in zip(rows, chosen, results, strict=True):
+                decisions[k] = self._decision(grasp, result)
+        return decisions
+
+    def _lift_of(self, grasp: Candidate) -> float:
+        return self._trial.motion.lift_height if grasp.lift is None else grasp.lift
+
+    def _decision(self, grasp: Candidate, result: TrialResult) -> Decision:
+        lift = {MarginNames.lift_height: self._lift_of(grasp)}
         decision = trial_decision(result)
-        return replace(decision, margins={**decision.margins, MarginNames.lift_height: lift})
+        return replace(decision, margins={**decision.margins, **lift})
 
 
 class ArmJudge(StationJudge):
@@ -505,6 +587,7 @@ def build_judge(
     engine: Engine,
     mode: Mode,
     settings: TrialSettings | None = None,
+    device: str | None = None,
 ) -> StationJudge:
     """Builds the judge of a mode, and the diagrams that all grasps share.
 
@@ -514,6 +597,7 @@ def build_judge(
         mode: mode of the run; all but `hand` need a station with an arm.
         settings: settings of the trial's phases; defaults if None. Without a motion in them, the
             station's is used.
+        device: device of an engine with parallel trials; see `BatchTrial`.
 
     Raises:
         InvalidInputError: the engine does not support arms, an object or the hand.
@@ -525,7 +609,7 @@ def build_judge(
     settings = TrialSettings() if settings is None else settings
     if mode == "arm":
         return ArmJudge(scene, station, engine=engine, settings=settings)
-    return HandJudge(scene, station, engine=engine, mode=mode, settings=settings)
+    return HandJudge(scene, station, engine=engine, mode=mode, settings=settings, device=device)
 
 
 @dataclass(frozen=True)
@@ -537,8 +621,14 @@ class StationJudgeFactory:
     engine: Engine
     mode: Mode
     settings: TrialSettings | None = None
+    device: str | None = None
 
     def __call__(self) -> StationJudge:
         return build_judge(
-            self.scene, self.station, engine=self.engine, mode=self.mode, settings=self.settings
+            self.scene,
+            self.station,
+            engine=self.engine,
+            mode=self.mode,
+            settings=self.settings,
+            device=self.device,
         )

@@ -185,11 +185,12 @@ def rerun(
 def judge_of_trial(
     scene: Scene, station: Station, trial: RecordedTrial, origin: TrialOrigin
 ) -> StationJudge:
-    """The cheapest judge that gives a recorded trial its verdict again."""
+    """The cheapest judge that gives a recorded trial its verdict again: on the CPU, with results
+    that differ by rounding, if it was executed on a graphics card."""
     return build_judge(
         scene,
         station,
-        engine=origin.engine,
+        engine=origin.engine.serial,
         mode=mode_for(station, decisive_mode(trial, origin)),
         settings=origin.settings(),
     )
@@ -232,6 +233,9 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
     if all(difference.rounding for difference in found):
         names = ", ".join(difference.name for difference in found)
         return [f"as recorded, except for the last digits of {names}, which the table rounds"]
+    if origin.engine.parallel and not any(one.name == "outcome" for one in found):
+        single = f"engine {origin.engine.serial.name} on the CPU"
+        return [f"as recorded, but for what {single} rounds in another way", *map(str, found)]
     there = origin.versions
     here = software_versions({**JUDGING_PACKAGES, **origin.engine.packages})
     changed = [

@@ -114,6 +114,10 @@ class WorkSession:
         return replace(self, judged=judged, seconds=round(time.monotonic() - begun, 3))
 
 
+DEVICE_ENTRY = "device"
+"""Entry of `RunDocument.versions` with the devices of an engine with parallel trials."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunDocument:
     """A run of `burg-drake evaluate` or `reach` over one scene (`run.yaml`).

@@ -55,6 +55,7 @@ from burg_drake.evaluation.judge import (
 )
 from burg_drake.evaluation.report.pages import write_report
 from burg_drake.evaluation.run_document import (
+    DEVICE_ENTRY,
     Grasps,
     Library,
     RunDocument,
@@ -183,7 +184,14 @@ class RunRequest:
 
     def judge_factory(self, scene: Scene) -> StationJudgeFactory:
         """Builds the judges of a scene in worker processes."""
-        return StationJudgeFactory(scene, self.station, self.engine, self.mode, self.trial_settings)
+        return StationJudgeFactory(
+            scene,
+            self.station,
+            self.engine,
+            self.mode,
+            self.trial_settings,
+            self.settings.device,
+        )
 
     def narrow_to_scene(self, scene: Scene) -> RunRequest | None:
         """Narrows a request for many scenes to one of them.
@@ -265,8 +273,21 @@ class RunRequest:
             "seed": self.settings.seed,
             "shard": "" if self.shard is None else str(self.shard),
             "table": self.settings.table,
-            "versions": software_versions({**JUDGING_PACKAGES, **self.engine.packages}),
+            "versions": software_versions({**JUDGING_PACKAGES, **self.engine.packages})
+            | self.devices(),
         }
+
+    def devices(self) -> dict[str, str]:
+        """The devices of this machine on which an engine with parallel trials runs, as an entry of
+        the versions; none if a cluster has them."""
+        if not self.engine.parallel:
+            return {}
+        from burg_drake.simulation import describe_devices, find_devices
+
+        try:
+            return {DEVICE_ENTRY: describe_devices(find_devices(self.settings.device))}
+        except InvalidInputError:
+            return {}
 
     def document(self, folder: Path, scene: Scene) -> RunDocument:
         """Document of a run; counts and hash of the grasps are filled in later."""

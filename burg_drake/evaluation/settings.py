@@ -201,6 +201,8 @@ class EvaluationSettings:
             whole arm executes those grasps. None for `reach` if the station has an arm, else
             `hand`.
         engine: physics engine of the trials; an engine or the name of a preset.
+        device: where an engine with parallel trials runs: `cuda:0` and so on, or `cpu`; all cards
+            if None. It is recorded with the versions.
         tilt_limit_deg: a held target that turned in the hand by more than this since the grip ends
             as `lifted_turned`, above 0; 180 for no limit.
         slip_limit_mm: the same for a target that slid; infinite for no limit.
@@ -257,9 +259,15 @@ class EvaluationSettings:
     )
     engine: Engine | str = setting(
         DEFAULT_ENGINE,
-        "physics: reference (most accurate), standard, screening (fast), or mujoco for a second"
-        " opinion (needs burg-drake[mujoco])",
+        "physics: reference (most accurate), standard, screening (fast), mujoco for a second"
+        " opinion (needs burg-drake[mujoco]), or mujoco-gpu for a great many grasps (needs"
+        " burg-drake[gpu] and an NVIDIA card)",
         choices=tuple(ENGINES),
+    )
+    device: str | None = setting(
+        None,
+        "with engine mujoco-gpu: cuda:0, cuda:1, ..., or cpu for a try (default: all cards)",
+        metavar="DEVICE",
     )
     tilt_limit_deg: float = setting(
         round(math.degrees(DEFAULT_TRIAL.tilt_limit), 9),

@@ -68,6 +68,7 @@ class HandClearance:
             station_diagram, self._plant_context, self._query(), self._bodies, self._names
         )
         self._screen = HandScreen(shapes, others)
+        self._finger_screens: dict[int, HandScreen] = {}
 
     def check(self, instance: str, X_WG: Array) -> Clearance:
         """Checks one grasp; the result is the same as in a batch, bit by bit.
@@ -172,6 +173,45 @@ class HandClearance:
             while closed + step <= 1.0 and not self.touched(X_WG, closed + step):
                 closed += step
         return closed
+
+    def free_travels(self, X_WG: Array) -> Array:
+        """How far the fingers can close before they touch anything, for many grasps together.
+
+        Fingers overlap a body only beyond `CONTACT_TOLERANCE` here, and in `free_travel` at once,
+        so that the two may differ by a step.
+
+        Args:
+            X_WG: (N, 4, 4) grasps at which the open hand is clear.
+
+        Returns:
+            (N,) 0 (open) to 1 (pads together), to within 0.025.
+        """
+        coarse, levels = 5, 40  # Steps of 0.125 and 0.025.
+        level = np.zeros(len(X_WG), dtype=int)
+        for step in (coarse, 1):
+            rows = np.arange(len(X_WG))
+            while len(rows):
+                rows = rows[level[rows] + step <= levels]
+                for k in np.unique(level[rows] + step):
+                    at = rows[level[rows] + step == k]
+                    free = self._fingers_are_clear(k, levels, X_WG[at])
+                    level[at[free]] = k
+                    rows = rows[~np.isin(rows, at[~free])]
+        return level / levels
+
+    def _fingers_are_clear(self, level: int, levels: int, X_WG: Array) -> NDArray[np.bool_]:
+        """(N,) whether the fingers overlap nothing at grasps (N, 4, 4), closed up to a level."""
+        if level not in self._finger_screens:
+            self._hand.place(self._plant_context, np.eye(4), level / levels)
+            fingers = set(self._hand.fingers)
+            bodies = {g: b for g, b in self._bodies.items() if b in fingers}
+            shapes, _ = read_shapes(
+                self._station_diagram, self._plant_context, self._query(), bodies, self._names
+            )
+            self._finger_screens[level] = HandScreen(shapes, self._screen.bodies)
+        screen = self._finger_screens[level]
+        blocker, _ = screen.deepest(X_WG, list(screen.bodies))
+        return np.asarray(blocker == "")
 
     def touched(self, X_WG: Array, closed: float = 0.0) -> dict[str, float]:
         """Bodies that the hand overlaps, by Drake's own query for a single grasp.

@@ -1,7 +1,7 @@
 """Time stepping: grasp trials with their outcome and margins, and scenes that come to rest.
 
 Read `grasp_trial` first, then `trial_execution`, the phases of a trial. `settled_scene` brings a
-scene to rest; `perturbation` and `grip_limits` repeat trials.
+scene to rest; `perturbation` and `grip_limits` repeat trials. `batch` executes many at once.
 """
 
 import lazy_loader
@@ -10,6 +10,7 @@ __getattr__, _, _ = lazy_loader.attach_stub(__name__, __file__)
 
 __all__ = [
     "ArmLiftClearance",
+    "BatchTrial",
     "BodyContact",
     "Carrier",
     "ContactReader",
@@ -23,6 +24,7 @@ __all__ = [
     "LiftPath",
     "LoadSettings",
     "Margins",
+    "ModelIndex",
     "MujocoTrial",
     "MujocoWorld",
     "Neighbours",

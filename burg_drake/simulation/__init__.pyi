@@ -1,4 +1,10 @@
 from .arm_trial import ArmTrial as ArmTrial
+from .batch.batch_trial import BatchTrial as BatchTrial
+from .batch.warp_device import (
+    describe_devices as describe_devices,
+    find_devices as find_devices,
+    require_warp as require_warp,
+)
 from .contacts import (
     BodyContact as BodyContact,
     ContactReader as ContactReader,
@@ -42,7 +48,11 @@ from .mujoco_trial import (
     check_objects as check_objects,
     hand_trial_of as hand_trial_of,
 )
-from .mujoco_world import MujocoWorld as MujocoWorld, require_mujoco as require_mujoco
+from .mujoco_world import (
+    ModelIndex as ModelIndex,
+    MujocoWorld as MujocoWorld,
+    require_mujoco as require_mujoco,
+)
 from .object_motions import GripMotion as GripMotion, MotionTracker as MotionTracker
 from .perturbation import (
     PerturbedTrial as PerturbedTrial,

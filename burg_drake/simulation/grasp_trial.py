@@ -134,12 +134,20 @@ class GraspTrial(ABC, Generic[W]):
         Raises:
             InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
         """
+        return self.X_WO(instance) @ check_pose(X_OG, "X_OG")
+
+    def X_WO(self, instance: str) -> Array:
+        """Pose (4, 4) of an instance in the scene, in the world.
+
+        Raises:
+            InvalidInputError: `instance` cannot be grasped.
+        """
         if instance not in self.scene.instances:
             free = ", ".join(self.scene.instances) or "(none)"
             raise InvalidInputError(
                 f"{instance!r} is not a free instance of scene {self.scene.name!r}; free are {free}"
             )
-        return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
+        return instance_pose(self.scene, self.station, instance)
 
     def execute(
         self,
@@ -170,7 +178,7 @@ class GraspTrial(ABC, Generic[W]):
         start = self._screen_start(instance, X_WG)
         if start is not None and start.outcome is not None:
             return collision_result(replace(start, outcome=Outcome.HAND_COLLISION_APPROACH))
-        world = self._world_of(instance)
+        world = self.world_of(instance)
         if without_hull and world.robot_meets_hull:
             world = self.complete_world
         try:
@@ -209,7 +217,7 @@ class GraspTrial(ABC, Generic[W]):
             friction, mass: the target's; the library's if None.
         """
         entry = self.scene.entry(instance)
-        X_WO = instance_pose(self.scene, self.station, instance)
+        X_WO = self.X_WO(instance)
         return GripLoad.of(
             X_WG,
             X_WO[:3, :3] @ entry.mass_properties.center_of_mass + X_WO[:3, 3],
@@ -227,16 +235,24 @@ class GraspTrial(ABC, Generic[W]):
             instance: the target.
             X_WG: (4, 4) grasp in the world at which the open hand is clear.
         """
+        return max(0.0, self.clearance.free_travel(X_WG) - self._excess(instance))
+
+    def closed_before_contacts(self, instance: str, X_WG: Array) -> Array:
+        """The same (N,) for many grasps (N, 4, 4) together; see `HandClearance.free_travels`."""
+        travels = self.clearance.free_travels(X_WG)
+        return np.maximum(0.0, travels - self._excess(instance))
+
+    def _excess(self, instance: str) -> float:
+        """How far the target's surface protrudes from its pieces, as a share of the closing."""
         travel = min(abs(f.closed - f.open) for f in self.station.hand.fingers)
-        excess = self.scene.entry(instance).contact.excess / travel
-        return max(0.0, self.clearance.free_travel(X_WG) - excess)
+        return self.scene.entry(instance).contact.excess / travel
 
     def _use_world(self, world: W | None) -> W:
         """Makes a world the current one; the complete world if None."""
         self._world = self.complete_world if world is None else world
         return self._world
 
-    def _world_of(self, instance: str) -> W:
+    def world_of(self, instance: str) -> W:
         """The cheapest usable world for trials of an instance."""
         if not self._lock:
             return self.complete_world
@@ -314,7 +330,7 @@ class HandAloneTrial(GraspTrial[W]):
         super().__init__(
             scene, station, engine, settings=settings, clearance=clearance, motion=motion, lock=lock
         )
-        self._lift_clearance = lru_cache(MAX_KEPT_WORLDS)(
+        self.lift_clearance = lru_cache(MAX_KEPT_WORLDS)(
             partial(HandLiftClearance, self._plain_diagram)
         )
 
@@ -342,20 +358,25 @@ class HandAloneTrial(GraspTrial[W]):
 
     def X_WG_start(self, X_WG: Array) -> Array:
         """Start pose (4, 4) of the hand for a grasp in the world: the grasp or its pregrasp."""
-        return X_WG if self._approach(X_WG) is None else self._pregrasp(X_WG)
+        return X_WG if self.approach_of(X_WG) is None else self.pregrasp_of(X_WG)
 
     def _screen_start(self, instance: str, X_WG: Array) -> Clearance | None:
-        if self._approach(X_WG) is None:
+        if self.approach_of(X_WG) is None:
             return None
-        return self.clearance.check(instance, self._pregrasp(X_WG))
+        return self.clearance.check(instance, self.pregrasp_of(X_WG))
 
-    def _approach(self, X_WG: Array) -> LiftPath | None:
+    @property
+    def approaches(self) -> bool:
+        """Whether trials begin at the pregrasp."""
+        return self.settings.approach and self.motion.standoff > 0.0
+
+    def approach_of(self, X_WG: Array) -> LiftPath | None:
         """The approach path to a grasp (4, 4) in the world; None if the hand begins there."""
-        if not self.settings.approach or self.motion.standoff <= 0.0:
+        if not self.approaches:
             return None
         return LiftPath(X_WG[:3, 2], self.motion.standoff)
 
-    def _pregrasp(self, X_WG: Array) -> Array:
+    def pregrasp_of(self, X_WG: Array) -> Array:
         """Pregrasp (4, 4) of a grasp in the world."""
         return make_pose(X_WG[:3, :3], X_WG[:3, 3] - self.motion.standoff * X_WG[:3, 2])
 
@@ -488,7 +509,7 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         world = self._use_world(world)
         target = world.diagram.free[instance]
         everything = set(world.diagram.free.values())
-        approach = self._approach(X_WG)
+        approach = self.approach_of(X_WG)
         beside_hand = set() if approach else world.neighbours.with_neighbours({target})
         moving = beside_hand if self._lock else everything
         world.prepare(instance, moving, friction, mass)
@@ -499,11 +520,11 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
             world.hand.place(world.plant_context, X_WG, closed, direction_W=paths[0].direction_W)
             world.command("hand", world.hand.closing_command())
         else:
-            X_WP = self._pregrasp(X_WG)
+            X_WP = self.pregrasp_of(X_WG)
             world.hand.place(world.plant_context, X_WP, direction_W=approach.direction_W)
             world.command("hand", world.hand.opening_command())
         world.command("lift", np.zeros(2))
         world.simulator.Initialize()
-        lift_clearance = partial(self._lift_clearance, instance)
+        lift_clearance = partial(self.lift_clearance, instance)
         carrier = LiftCarrier(world, paths, lift_clearance, approach, target)
         return Execution(world, target, moving, carrier)

@@ -238,12 +238,12 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
 
         def begin(world: MujocoWorld) -> Execution:
             self._use_world(world)
-            approach, target = self._approach(X_WG), world.free[instance]
-            X_WF = X_WG if approach is None else self._pregrasp(X_WG)
+            approach, target = self.approach_of(X_WG), world.free[instance]
+            X_WF = X_WG if approach is None else self.pregrasp_of(X_WG)
             closed = self.closed_before_contact(instance, X_WG) if approach is None else None
             direction_W = (approach or paths[0]).direction_W
             world.prepare(instance, X_WF, closed, direction_W, friction=friction, mass=mass)
-            lift_clearance = partial(self._lift_clearance, instance)
+            lift_clearance = partial(self.lift_clearance, instance)
             carrier = MujocoCarrier(world, paths, lift_clearance, approach, target)
             return Execution(world, target, set(world.free.values()), carrier)
 

@@ -9,7 +9,7 @@ import importlib
 import importlib.util
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
@@ -194,6 +194,7 @@ class MujocoWorld:
 
     Attributes:
         model, data: MuJoCo's model and data.
+        index: numbers of bodies, geoms and joints in the model.
         engine: as given.
         settings: as given, but `steady_time` is at least 0.1 s.
         free: bodies that can move, by name.
@@ -243,7 +244,7 @@ class MujocoWorld:
             ) from error
         self.data: Any = mj.MjData(self.model)
         self._scratch: Any = mj.MjData(self.model)
-        self._index = index = ModelIndex(self.model, hand)
+        self.index = index = ModelIndex(self.model, hand)
         could_move = {name: index.objects[name] for name in scene.instances}
         moving = (alone,) if alone is not None else tuple(scene.instances)
         self.free = {name: BodyIndex(could_move[name]) for name in moving}
@@ -294,20 +295,20 @@ class MujocoWorld:
             friction, mass: the target's, if not the library's.
         """
         model, data, hand = self.model, self.data, self._station.hand
-        target = self._index.objects[instance]
+        target = self.index.objects[instance]
         model.body_mass[:], model.body_inertia[:] = self._mass, self._inertia
         if mass is not None:
             model.body_inertia[target] *= mass / self._mass[target]
             model.body_mass[target] = mass
         X_WH = hand.X_AH(X_WG)
-        model.body_quat[self._index.hand] = quaternion_from_rotation(X_WH[:3, :3])
+        model.body_quat[self.index.hand] = quaternion_from_rotation(X_WH[:3, :3])
         self._place_lift(X_WH[:3, 3], direction_W)
         self._mj.mj_resetData(model, data)
-        for at, finger in zip(self._index.finger_qpos, hand.fingers, strict=True):
+        for at, finger in zip(self.index.finger_qpos, hand.fingers, strict=True):
             data.qpos[at] = finger.position(closed or 0.0)
         self._command_fingers(-1.0 if closed is None else 1.0)
         if closed is not None:
-            data.qvel[self._index.finger_dofs] = data.ctrl[self._index.finger_servos]
+            data.qvel[self.index.finger_dofs] = data.ctrl[self.index.finger_servos]
         own = self._scene.entry(instance).friction
         self._set_surfaces(instance, own if friction is None else friction)
         self._set_pads(target)
@@ -320,7 +321,7 @@ class MujocoWorld:
     def turn_lift(self, direction_W: Array) -> None:
         """Turns the carrier's joint to another direction (3,), at rest at the hand's current place;
         all other bodies keep moving."""
-        data, index = self.data, self._index
+        data, index = self.data, self.index
         self._mj.mj_kinematics(self.model, data)
         self._place_lift(np.array(data.xpos[index.hand]), direction_W)
         data.qpos[index.lift_qpos] = data.qvel[index.lift_dof] = 0.0
@@ -329,12 +330,9 @@ class MujocoWorld:
     def command_lift(self, travelled: float, speed: float, acceleration: float) -> None:
         """Commands position [m] and speed [m/s] of the carrier's joint after the next step, and its
         acceleration until then [m/s^2]."""
-        index = self._index
-        inertia = self.model.dof_armature[index.lift_dof]
-        inertia += self.model.body_subtreemass[index.carrier]
-        self.data.qfrc_applied[index.lift_dof] = inertia * acceleration
-        self.data.ctrl[self._index.lift_position_servo] = travelled
-        self.data.ctrl[self._index.lift_speed_servo] = speed
+        self.data.qfrc_applied[self.index.lift_dof] = self.carried_mass * acceleration
+        self.data.ctrl[self.index.lift_position_servo] = travelled
+        self.data.ctrl[self.index.lift_speed_servo] = speed
 
     def advance(self, steps: int) -> None:
         """Advances the simulation with the current commands."""
@@ -379,18 +377,22 @@ class MujocoWorld:
 
     def finger_speed(self) -> float:
         """Speed of the faster finger [m/s]."""
-        return float(np.abs(self.data.qvel[self._index.finger_dofs]).max())
+        return float(np.abs(self.data.qvel[self.index.finger_dofs]).max())
 
     def robot_positions(self, model: str) -> Array | None:
         """Positions of `hand` and `lift`, in the order of a station diagram."""
         if model == "lift":
             return np.array([self.travelled()])
-        fingers = np.array(self.data.qpos[self._index.finger_qpos])
-        return fingers[list(self._parts.plant_order)] if model == "hand" else None
+        fingers = np.array(self.data.qpos[self.index.finger_qpos])
+        return self.in_plant_order(fingers) if model == "hand" else None
+
+    def in_plant_order(self, fingers: Array) -> Array:
+        """Positions (2,) of both fingers in the order of a station diagram."""
+        return fingers[list(self._parts.plant_order)]
 
     def travelled(self) -> float:
         """Position of the carrier's joint [m]."""
-        return float(self.data.qpos[self._index.lift_qpos])
+        return float(self.data.qpos[self.index.lift_qpos])
 
     def X_WG(self) -> Array:
         """Grasp frame (4, 4) in the world."""
@@ -417,14 +419,12 @@ class MujocoWorld:
 
     def _command_fingers(self, closing: float) -> None:
         """Commands the fingers to close (1), or to open (-1) against their stops."""
-        hand = self._station.hand
-        speeds = [np.sign(f.closed - f.open) * hand.closing_speed for f in hand.fingers]
-        self.data.ctrl[self._index.finger_servos] = closing * np.array(speeds)
+        self.data.ctrl[self.index.finger_servos] = closing * self.closing_speeds
 
     def _place_lift(self, p_WH: Array, direction_W: Array) -> None:
         """Places the carrier, with its joint along a direction (3,)."""
-        self.model.body_pos[self._index.carrier] = p_WH
-        self.model.jnt_axis[self._index.lift_joint] = direction_W
+        self.model.body_pos[self.index.carrier] = p_WH
+        self.model.jnt_axis[self.index.lift_joint] = direction_W
         self._mj.mj_setConst(self.model, self._scratch)
 
     def _set_surfaces(self, instance: str, mu: float) -> None:
@@ -435,34 +435,76 @@ class MujocoWorld:
         hand_priority = 1
         others_priority = 2  # Priority of free objects other than the target.
         fixed_priority = 3  # Priority of bodies that do not move.
-        model, index = self.model, self._index
+        model, index = self.model, self.index
+        own, table = self.own_friction(instance)
+        model.geom_friction[:, 0] = np.where(np.isnan(own), mu, combined_friction(own, mu))
         for geoms in (index.finger_geoms, index.palm):
             model.geom_priority[geoms] = hand_priority
-        model.geom_friction[index.finger_geoms, 0] = mu
-        model.geom_friction[index.palm, 0] = [
-            combined_friction(mu, f) for f in self._friction_of_palm
-        ]
-        table = self._station.document.table.friction
         for name, geoms in index.geoms.items():
-            known = name in self._scene.instances or name in self._scene.background
-            own = self._scene.entry(name).friction if known else table
-            own = mu if name == instance else own
             others = fixed_priority if name in index.fixed else others_priority
             model.geom_priority[geoms] = 0 if name == instance else others
-            model.geom_friction[geoms, 0] = combined_friction(own, mu)
-            if name in index.pairs:
-                model.pair_friction[index.pairs[name], :2] = combined_friction(own, table)
+        for name, pairs in index.pairs.items():
+            known = mu if name == instance else self._scene.entry(name).friction
+            model.pair_friction[pairs, :2] = combined_friction(known, table)
+
+    def own_friction(self, instance: str) -> tuple[Array, float]:
+        """Friction coefficients that `combined_friction` combines with the target's.
+
+        Args:
+            instance: the target.
+
+        Returns:
+            (geoms,) coefficients; NaN for fingers and target, for which the target's counts as it
+            is. The coefficient of the table's plane.
+        """
+        index, table = self.index, self._station.document.table.friction
+        own = np.full(self.model.ngeom, np.nan)
+        own[index.palm] = self._friction_of_palm
+        for name, geoms in index.geoms.items():
+            known = name in self._scene.instances or name in self._scene.background
+            if name != instance:
+                own[geoms] = self._scene.entry(name).friction if known else table
+        return own, table
 
     def _set_pads(self, target: int) -> None:
         """Sets the stiffness of the pads, which in MuJoCo depends on the body that they touch."""
         model = self.model
-        for finger, body, spheres in zip(
-            self._parts.fingers, self._index.fingers, self._index.spheres, strict=True
-        ):
-            mobility = float(model.body_invweight0[[body, target], 0].sum())
-            solref, impedance = pad_contact(finger.front, mobility, self.engine.time_step)
-            model.geom_solimp[spheres, :2] = impedance
-            model.geom_solref[spheres] = solref
+        mobility = float(model.body_invweight0[target, 0])
+        for spheres, contact in zip(self.index.spheres, self.pad_contacts(mobility), strict=True):
+            model.geom_solref[spheres] = contact[:2]
+            model.geom_solimp[spheres, :2] = contact[2]
+
+    def pad_contacts(self, mobility: float) -> Array:
+        """Stiffness, damping and impedance (2, 3) of the pads' contact with a target; see
+        `pad_contact`.
+
+        Args:
+            mobility: inverse mass of the target [1/kg].
+        """
+        fingers = self.model.body_invweight0[self.index.fingers, 0]
+        contacts = []
+        for finger, own in zip(self._parts.fingers, fingers, strict=True):
+            solref, impedance = pad_contact(finger.front, own + mobility, self.engine.time_step)
+            contacts.append((*solref, impedance))
+        return np.array(contacts)
+
+    @property
+    def carried_mass(self) -> float:
+        """Mass that the carrier's joint accelerates, with the inertia of its drive [kg]."""
+        index = self.index
+        inertia = self.model.dof_armature[index.lift_dof]
+        return float(inertia + self.model.body_subtreemass[index.carrier])
+
+    @property
+    def sphere_areas(self) -> Array:
+        """(2,) contact area that a sphere of each pad stands for [m^2]."""
+        return np.array([self._shares[spheres[0]] for spheres in self.index.spheres])
+
+    @property
+    def closing_speeds(self) -> Array:
+        """(2,) signed speeds with which the joints of the fingers close [m/s]."""
+        hand = self._station.hand
+        return np.array([np.sign(f.closed - f.open) * hand.closing_speed for f in hand.fingers])
 
     def _may_lean(self, instance: str) -> bool:
         """Whether the target is so close to a movable object that it may lean on it."""
@@ -471,15 +513,19 @@ class MujocoWorld:
         mj.mj_resetData(model, data)
         mj.mj_kinematics(model, data)
         fromto = np.zeros(6)
-        others = [g for name in self.standing for g in self._index.geoms[name]]
+        others = [g for name in self.standing for g in self.index.geoms[name]]
         return any(
             mj.mj_geomDistance(model, data, int(one), int(other), leaning_distance, fromto)
             < leaning_distance
-            for one in self._index.geoms[instance]
+            for one in self.index.geoms[instance]
             for other in others
         )
 
 
-def combined_friction(a: float, b: float) -> float:
+Coefficient = TypeVar("Coefficient", float, Array)
+
+
+def combined_friction(a: Coefficient, b: float) -> Coefficient:
     """Friction coefficient that Drake uses for two surfaces."""
-    return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
+    both: Coefficient = 2.0 * a * b / np.maximum(a + b, np.finfo(float).tiny)
+    return both

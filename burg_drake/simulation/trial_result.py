@@ -216,6 +216,7 @@ def confidence(engine: Engine, outcome: Outcome, margins: Margins, load: GripLoa
     Returns:
         Probability; None if no trial decided, or the engine is not a calibrated preset.
     """
+    engine = engine.serial
     if ENGINES.get(engine.name) != engine:
         return None
     return confidence_from_signs(engine.name, outcome, grip_signs(margins, load))

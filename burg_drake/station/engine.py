@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from burg_drake.core import (
@@ -37,6 +37,7 @@ class Engine:
         stiction_tolerance: largest speed at which bodies creep that friction holds [m/s].
         whole_trial: whether every trial is simulated to its end. Otherwise it ends as soon as its
             outcome is decided.
+        parallel: whether many trials are simulated at once, on a graphics card.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
@@ -52,6 +53,7 @@ class Engine:
     contact_surface: Literal["polygon", "triangle"] = "polygon"
     stiction_tolerance: float = 1e-5
     whole_trial: bool = False
+    parallel: bool = False
 
     def __post_init__(self) -> None:
         require_ranges(self, f"engine {quote_value(self.name)}")
@@ -66,7 +68,17 @@ class Engine:
     def packages(self) -> dict[str, str]:
         """Additional packages that affect its results: their names in files and their installed
         names."""
+        if self.parallel:
+            return {"mujoco": "mujoco", "mujoco_warp": "mujoco-warp", "warp": "warp-lang"}
         return {} if self.simulator == "drake" else {self.simulator: self.simulator}
+
+    @property
+    def serial(self) -> Engine:
+        """The engine of the same physics that simulates trials one by one, on the CPU; it itself,
+        unless it is parallel."""
+        if not self.parallel:
+            return self
+        return replace(self, name=self.name.removesuffix("-gpu"), parallel=False)
 
 
 ENGINES = {
@@ -76,9 +88,11 @@ ENGINES = {
         Engine(name="standard", time_step=0.002),
         Engine(name="screening", time_step=0.005),
         Engine(name="mujoco", simulator="mujoco", time_step=0.001),
+        Engine(name="mujoco-gpu", simulator="mujoco", time_step=0.001, parallel=True),
     )
 }
-"""Presets: `reference`, `standard`, `screening` (Drake), and `mujoco`, which is independent."""
+"""Presets: `reference`, `standard`, `screening` (Drake), `mujoco`, which is independent, and
+`mujoco-gpu`, the same for many trials at once."""
 DRAKE_ENGINES = tuple(name for name, engine in ENGINES.items() if engine.simulator == "drake")
 """Names of the presets that step Drake diagrams."""
 

@@ -186,6 +186,7 @@ class OptionalFeature:
 
 OPTIONAL_FEATURES = (
     OptionalFeature("mujoco", "second opinion by MuJoCo", "mujoco", "mujoco"),
+    OptionalFeature("gpu", "many trials at once on a card", "mujoco-warp", "warp"),
     OptionalFeature("ui", "scene editor (burg-drake setup)", "viser", "msgspec"),
     OptionalFeature("parquet", "tables in Parquet", "pyarrow", "pyarrow.lib"),
     OptionalFeature("benchmark", "benchmarks of grasp planners", "msgpack", "websockets"),

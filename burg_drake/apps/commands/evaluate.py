@@ -209,6 +209,7 @@ def add_evaluate_options(parser: options.Parser) -> None:
         "burg-drake evaluate tabletop_six --until-balanced 10 -o runs/lab",
         "burg-drake evaluate tabletop_six -n 20 --mode arm -o runs/arm",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
+        "burg-drake evaluate tabletop_six -n 100000 --mode hand --engine mujoco-gpu -o runs/many",
         "burg-drake evaluate tabletop_six -n 1000 --cluster tls://head.example.org:8786",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
@@ -238,7 +239,7 @@ def add_evaluate_options(parser: options.Parser) -> None:
         evaluation.EvaluationSettings,
         *("until_balanced", "balanced_among", "max_grasps_per_object"),
     )
-    options.add_settings_options(parser, evaluation.EvaluationSettings, "engine")
+    options.add_settings_options(parser, evaluation.EvaluationSettings, "engine", "device")
     add_rejudge_contested(parser)
     workers_group = parser.add_mutually_exclusive_group()
     options.add_workers(workers_group)

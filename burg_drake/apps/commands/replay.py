@@ -128,12 +128,16 @@ def _replay(source: ReplaySource, meshcat: Any) -> _Replay:
         *evaluation.arm_figures(verdict),
     ]
     lines += evaluation.motion_figures(source.trial, source.origin)
+    if source.origin.engine.parallel:
+        lines.append(f"simulated by engine {source.origin.engine.serial.name}, on the CPU")
     recorded = source.trial.verdict
     differences = [] if recorded is None else evaluation.differences(recorded, verdict)
     lines += [] if recorded is None else evaluation.comparison(differences, source.origin)
     if shown.outcome is not verdict.outcome:
         lines += [f"shown is {shown_part}, to the end:", *visualization.describe_trial(shown)]
     as_recorded = all(difference.rounding for difference in differences)
+    if source.origin.engine.parallel and recorded is not None:
+        as_recorded = verdict.outcome is recorded.outcome
     return _Replay(lines, float(shown.margins.end_time), as_recorded)
 
 

@@ -13,6 +13,7 @@ from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.report.page_elements import ReportSection
 from burg_drake.evaluation.run_document import (
+    DEVICE_ENTRY,
     HASH_DIGITS,
     CampaignDocument,
     Input,
@@ -195,6 +196,7 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
     packages = ("burg_drake", "drake", "python")
     approach = "; its approach is simulated" if document.trial.get("approach") else ""
     names = (*packages, *document.engine.packages)
+    device = document.versions.get(DEVICE_ENTRY)
     return [
         ("station", _content_text(document.station)),
         ("mode", f"{document.mode}: {MODE_MEANINGS[document.mode]}{approach}"),
@@ -202,6 +204,7 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
         ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
+        *([("device", device)] if device else []),
     ]
 
 

@@ -386,7 +386,11 @@ def reach_verdicts(
     """
     origin = origin_of(hand.document)
     build = StationJudgeFactory(
-        hand.scene(), hand.station(), origin.engine, "reach", origin.settings(f"{hand.path}: trial")
+        hand.scene(),
+        hand.station(),
+        origin.engine.serial,
+        "reach",
+        origin.settings(f"{hand.path}: trial"),
     )
     trials = {id: v for id, v in hand.verdicts.items() if _was_executed(v)}
     todo = [candidate for candidate in hand.candidates if candidate.id not in known]

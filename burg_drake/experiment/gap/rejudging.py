@@ -197,7 +197,8 @@ def _rejudge_task(
     if measured.scene is None:
         return _RejudgeTask(trial)
     settings = origin.settings(f"{run.path}: trial")
-    factory = StationJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
+    engine = origin.engine.serial
+    factory = StationJudgeFactory(measured.scene, station, engine, origin.mode, settings)
     X_OG = grasps_as_commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
     judge_content = content_hash(
         *(measured.scene.content, station.content, origin.mode),

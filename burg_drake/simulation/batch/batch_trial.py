@@ -1,0 +1,378 @@
+"""Trials of many grasps at once with the hand alone, on a graphics card.
+
+Screen, phases, decisions and margins are those of `MujocoTrial`; the worlds are stepped together by
+MuJoCo Warp, in which only the target can move. What needs more is executed one by one on the CPU:
+trials in which another object is touched, targets that may lean on one, and worlds that have more
+contacts than fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.multibody.tree import BodyIndex
+from scipy.spatial.transform import Rotation
+
+from burg_drake.core import Array, Indices, Margins, Outcome, check_pose, make_pose
+from burg_drake.grasping import Clearance
+from burg_drake.scene import SceneLike
+from burg_drake.simulation.batch.trial_starts import (
+    End,
+    Loads,
+    TrialEnds,
+    TrialStarts,
+    trial_starts,
+)
+from burg_drake.simulation.batch.warp_device import (
+    claimed,
+    describe_devices,
+    find_devices,
+)
+from burg_drake.simulation.mujoco_trial import MujocoTrial
+from burg_drake.simulation.mujoco_world import MujocoWorld
+from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.simulation.trial_result import (
+    TrialResult,
+    collision_result,
+    confidence,
+    simulation_failure_result,
+)
+from burg_drake.simulation.trial_world import check_overrides
+from burg_drake.station import ENGINES, Engine, GraspMotion, StationLike
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.batch.parallel_worlds import ParallelWorlds
+
+WORLDS_ON_A_CARD = 16384
+"""Most trials a second on an H100; each world takes about 1 MB."""
+WORLDS_ON_THE_CPU = 8
+"""More are not faster there."""
+TRIALS_PER_WORLD = 3
+"""Trials of a batch: worlds whose trial is done begin another, but wait at the end of a batch."""
+OUTCOMES = {
+    End.SLIPPED: Outcome.SLIPPED,
+    End.DROPPED: Outcome.DROPPED,
+    End.ONE_FINGER: Outcome.ONE_FINGER,
+    End.CLOSED_EMPTY: Outcome.CLOSED_EMPTY,
+    End.NO_CONTACT: Outcome.NO_CONTACT,
+    End.BLOCKED: Outcome.BLOCKED,
+}
+"""Outcomes of trials in which the target was not held to the end."""
+NEEDS_CPU = (End.OTHER_TOUCHED, End.UNPLANNED_TOUCH, End.OVERFLOW)
+"""Ends of trials that are then executed on the CPU."""
+
+
+class BatchTrial:
+    """Executes many grasps of a scene with the hand alone, in parallel worlds.
+
+    Results are those of `MujocoTrial` but for rounding. A grasp has the same result, to the bit,
+    alone or among others, in any order, on the same device with the same versions.
+
+    Example::
+
+        trial = burg.simulation.BatchTrial("tabletop_six", "panda_tabletop")
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 10_000, only=["mug"])
+        results = trial.run("mug", grasps.X_OG)
+
+    Args:
+        scene: the scene.
+        station: table, board pose and hand.
+        engine: engine with the time step, or the name of a preset.
+        settings: phases of a trial.
+        motion: the hand's motion around the grasp; by default that of the settings, else the
+            station's.
+        device: `cuda:0` and so on, or `cpu`; if None all cards, of which each batch takes one that
+            no other process uses.
+        worlds: number of worlds; as many as fit, up to `WORLDS_ON_A_CARD`, if None.
+
+    Attributes:
+        single: the trial that executes grasps one by one on the CPU.
+        device: name of the device, with the versions of driver and CUDA.
+        worlds: largest number of worlds.
+        batch_size: number of grasps beyond which a trial gets hardly cheaper.
+        on_cpu: number of grasps that were executed on the CPU so far.
+
+    Raises:
+        MissingDependencyError: MuJoCo or Warp are not installed in the required versions.
+        InvalidInputError: there is no such device; or see `MujocoTrial`.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        *,
+        engine: Engine | str = ENGINES["mujoco-gpu"],
+        settings: TrialSettings = DEFAULT_TRIAL,
+        motion: GraspMotion | None = None,
+        device: str | None = None,
+        worlds: int | None = None,
+    ) -> None:
+        self._devices = find_devices(device)
+        self.device = describe_devices(self._devices)
+        on_card = self._devices[0].is_cuda
+        self.worlds = worlds or (WORLDS_ON_A_CARD if on_card else WORLDS_ON_THE_CPU)
+        self.batch_size = TRIALS_PER_WORLD * self.worlds
+        self.single = MujocoTrial(scene, station, engine=engine, settings=settings, motion=motion)
+        self.on_cpu = 0
+        self._worlds_of = lru_cache(1)(self._build_worlds)
+
+    def run(
+        self,
+        instance: str,
+        X_OG: Array,
+        *,
+        friction: ArrayLike | None = None,
+        mass: ArrayLike | None = None,
+        lift: ArrayLike | None = None,
+        progress: Callable[[], None] | None = None,
+    ) -> list[TrialResult]:
+        """Executes grasps.
+
+        Args:
+            instance: name of the target in the scene.
+            X_OG: (N, 4, 4) grasps in the target's frame.
+            friction: the target's friction coefficients, a number or (N,); the library's if None,
+                and where NaN.
+            mass: its masses [kg], likewise.
+            lift: lengths of the lift [m], likewise; those of the motion if None, and where NaN.
+            progress: called several times a second; may raise, to end the work.
+
+        Returns:
+            The outcome of each grasp with its margins, in order. A failure of the simulator is an
+            outcome, too.
+
+        Raises:
+            InvalidInputError: `X_OG` are not poses, `instance` cannot be grasped, a friction
+                coefficient is below 0, a mass is not above 0, or a lift has no length.
+        """
+        single = self.single
+        X_WO = single.X_WO(instance)
+        X_OG = check_pose(np.asarray(X_OG, dtype=float), "X_OG").reshape(-1, 4, 4)
+        entry, n = single.scene.entry(instance), len(X_OG)
+        loads = Loads(
+            _filled(friction, entry.friction, n),
+            _filled(mass, entry.mass, n),
+            _filled(lift, single.motion.lift_height, n),
+        )
+        for one in np.unique(loads.friction):
+            check_overrides(float(one), None)
+        for one in np.unique(loads.mass):
+            check_overrides(None, float(one))
+        # One by one: products of stacked matrices may differ in the last bit.
+        X_WG = np.array([X_WO @ X for X in X_OG]).reshape(-1, 4, 4)
+        batch = _Batch(single, instance, X_OG, X_WG, loads)
+        batch.screen()
+        world = single.world_of(instance)
+        if set(world.free) == {instance}:
+            with claimed(self._devices) as device:
+                worlds = self._worlds_of(instance, device.alias)
+                batch.step_worlds(worlds, world, self.worlds, progress)
+        self.on_cpu += batch.execute_rest()
+        return batch.results()
+
+    def _build_worlds(self, instance: str, device: str) -> ParallelWorlds:
+        from burg_drake.simulation.batch.parallel_worlds import ParallelWorlds
+
+        single = self.single
+        return ParallelWorlds(
+            single.world_of(instance),
+            instance,
+            single.X_WO(instance),
+            device,
+            approaches=single.approaches,
+        )
+
+
+class _Batch:
+    """Trials of one target.
+
+    Args:
+        trial: executes them one by one.
+        instance: the target.
+        X_OG, X_WG: (N, 4, 4) grasps in its frame and in the world.
+        loads: what differs between them.
+    """
+
+    def __init__(
+        self, trial: MujocoTrial, instance: str, X_OG: Array, X_WG: Array, loads: Loads
+    ) -> None:
+        self._trial, self._instance = trial, instance
+        self._X_OG, self._X_WG, self._loads = X_OG, X_WG, loads
+        self._results: dict[int, TrialResult] = {}
+        self._screens: list[Clearance] = []
+
+    def results(self) -> list[TrialResult]:
+        """The results in the order of the grasps."""
+        return [self._results[k] for k in range(len(self._X_WG))]
+
+    def screen(self) -> None:
+        """Screens the open hand at the grasps and at the starts of their approaches."""
+        trial, instance = self._trial, self._instance
+        self._screens = trial.clearance.check_all(instance, self._X_WG)
+        for k, screen in enumerate(self._screens):
+            if screen.outcome is not None:
+                self._results[k] = collision_result(screen)
+        rows = self._open_rows()
+        if trial.approaches and len(rows):
+            starts = np.array([trial.pregrasp_of(X) for X in self._X_WG[rows]])
+            for k, screen in zip(rows, trial.clearance.check_all(instance, starts), strict=True):
+                if screen.outcome is not None:
+                    blocked = replace(screen, outcome=Outcome.HAND_COLLISION_APPROACH)
+                    self._results[int(k)] = collision_result(blocked)
+
+    def step_worlds(
+        self,
+        worlds: ParallelWorlds,
+        world: MujocoWorld,
+        count: int,
+        progress: Callable[[], None] | None,
+    ) -> None:
+        """Executes the open grasps in parallel worlds; leaves open what these cannot decide.
+
+        Args:
+            worlds: the parallel worlds.
+            world: the world that they repeat.
+            count: their number.
+            progress: see `BatchTrial.run`.
+        """
+        rows = self._open_rows()
+        if not len(rows):
+            return
+        loads = Loads(*(values[rows] for values in vars(self._loads).values()))
+        starts = trial_starts(self._trial, world, self._instance, self._X_WG[rows], loads)
+        ends = worlds.run(starts, count, progress)
+        blocked = self._record(rows, world, starts, ends)
+        if len(blocked):
+            again = starts.at(blocked)
+            again = replace(again, early=np.zeros(len(blocked), dtype=bool))
+            self._record(rows[blocked], world, again, worlds.run(again, count))
+
+    def execute_rest(self) -> int:
+        """Executes open grasps on the CPU; returns their number."""
+        rows, loads = self._open_rows(), self._loads
+        for k in rows.tolist():
+            self._results[k] = self._trial.run(
+                self._instance,
+                self._X_OG[k],
+                friction=float(loads.friction[k]),
+                mass=float(loads.mass[k]),
+                lift=float(loads.lift[k]),
+            )
+        return len(rows)
+
+    def _open_rows(self) -> Indices:
+        return np.array(
+            [k for k in range(len(self._X_WG)) if k not in self._results], dtype=np.intp
+        )
+
+    def _record(
+        self, rows: Indices, world: MujocoWorld, starts: TrialStarts, ends: TrialEnds
+    ) -> Indices:
+        """Records decided trials; returns those that would have ended early on a blocked path."""
+        blocked = []
+        for k, row in enumerate(rows.tolist()):
+            end = End(ends.end[k])
+            if end in NEEDS_CPU:
+                continue
+            if end is End.HELD_IF_FREE and not self._is_free_ahead(row, k, world, starts, ends):
+                blocked.append(k)
+                continue
+            self._results[row] = self._result(row, k, world, ends)
+        return np.array(blocked, dtype=np.intp)
+
+    def _is_free_ahead(
+        self, row: int, k: int, world: MujocoWorld, starts: TrialStarts, ends: TrialEnds
+    ) -> bool:
+        """Whether the rest of the last segment is free of collisions."""
+        way = starts.ways[k, 2 if starts.checks[k, 2] else 1]
+        X_WG = make_pose(self._X_WG[row, :3, :3], ends.p_WG[k])
+        target = _HeldTarget(world, self._instance, ends, k)
+        clearance = self._trial.lift_clearance(self._instance)
+        return clearance.is_free(target, X_WG, float(ends.left[k]), way[:3])
+
+    def _result(self, row: int, k: int, world: MujocoWorld, ends: TrialEnds) -> TrialResult:
+        """The result of a trial, as `Execution` has it."""
+        trial, settings, end = self._trial, self._trial.settings, End(ends.end[k])
+        time = float(ends.check[k]) * settings.poll
+        if end is End.NOT_FINITE:
+            error = RuntimeError(f"the state is not finite at {time:.3f} s")
+            return simulation_failure_result(error, self._screens[row], time)
+        slip, tilt = float(ends.slip[k]), float(ends.tilt[k])
+        has_gripped = slip >= 0.0
+        outcome = OUTCOMES.get(end)
+        if outcome is None:
+            beyond = slip > settings.slip_limit or tilt > settings.tilt_limit
+            outcome = Outcome.LIFTED_TURNED if beyond else Outcome.LIFTED
+        left = float(ends.left[k]) if end is End.HELD_IF_FREE else 0.0
+        still = dict.fromkeys(world.standing, 0.0)
+        pushed = {**still, self._instance: float(ends.pushed[k])} if trial.approaches else {}
+        margins = Margins(
+            overlap=0.0,
+            clearance=self._screens[row].clearance,
+            slip=slip if has_gripped else np.nan,
+            tilt=tilt if has_gripped else np.nan,
+            pad_force=float(np.abs(ends.force[k]).min()) if has_gripped else np.nan,
+            patch_area=float((ends.spheres[k] * world.sphere_areas).min())
+            if has_gripped
+            else np.nan,
+            lift=float(ends.lift[k]) + left,
+            others_moved=0.0,
+            others_turned=0.0,
+            end_time=time,
+            pushed=max(pushed.values(), default=np.nan),
+        )
+        grip_start = float(ends.grip_check[k]) * settings.poll
+        load = trial.grip_load(
+            self._instance,
+            self._X_WG[row],
+            friction=float(self._loads.friction[row]),
+            mass=float(self._loads.mass[row]),
+        )
+        since_grip = replace(margins, end_time=time - grip_start)
+        return TrialResult(
+            outcome=outcome,
+            grip_start=grip_start,
+            margins=margins,
+            confidence=confidence(trial.engine, outcome, since_grip, load),
+            blocker=world.body_names[BodyIndex(int(ends.blocker[k]))]
+            if outcome is Outcome.BLOCKED
+            else "",
+            displacements=still,
+            turned=dict(still),
+            pushed=pushed,
+        )
+
+
+class _HeldTarget:
+    """A target in the hand at the end of a trial; see `PlacedRobot`."""
+
+    def __init__(self, world: MujocoWorld, instance: str, ends: TrialEnds, k: int) -> None:
+        self.free: Mapping[str, BodyIndex] = {instance: world.free[instance]}
+        self._world, self._ends, self._k = world, ends, k
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """Pose (4, 4) of the target in the world."""
+        R_WO = Rotation.from_quat(self._ends.q_WO[self._k]).as_matrix()
+        return make_pose(R_WO, self._ends.p_WO[self._k])
+
+    def robot_positions(self, model: str) -> Array | None:
+        """Positions of `hand` and `lift`, in the order of a station diagram."""
+        if model == "lift":
+            return np.array([self._ends.travelled[self._k]])
+        return (
+            self._world.in_plant_order(self._ends.last_fingers[self._k])
+            if model == "hand"
+            else None
+        )
+
+
+def _filled(values: ArrayLike | None, default: float, n: int) -> Array:
+    """(n,) values, with the default in place of None and NaN."""
+    given = np.broadcast_to(np.nan if values is None else np.asarray(values, dtype=float), (n,))
+    return np.where(np.isnan(given), default, given)

@@ -1,0 +1,381 @@
+"""Steps many trials of one target at once on a device."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import mujoco
+import mujoco_warp
+import numpy as np
+import warp as wp
+from mujoco_warp import OverflowType
+from scipy.spatial.transform import Rotation
+
+from burg_drake.core import Array, Indices
+from burg_drake.simulation.batch import trial_kernels
+from burg_drake.simulation.batch.device_arrays import (
+    IDLE,
+    PER_WORLD,
+    Bodies,
+    Constants,
+    Counts,
+    Masses,
+    Trials,
+    WorldStates,
+    element_types,
+    physics_of,
+)
+from burg_drake.simulation.batch.fixed_order import ROWS, fixed_order
+from burg_drake.simulation.batch.trial_starts import End, TrialEnds, TrialStarts
+from burg_drake.simulation.mujoco_world import MujocoWorld
+
+CHECKS_PER_LOOK = 10
+"""Contact checks between two looks at how many trials are done."""
+OVERFLOWS = (
+    OverflowType.NEFC
+    | OverflowType.BROADPHASE
+    | OverflowType.NARROWPHASE
+    | OverflowType.CCD
+    | OverflowType.EPA_HORIZON
+)
+"""Overflows that make a world wrong. The limits of the solver's iterations are not among them: the
+engine on the CPU has them, too."""
+TOLERANCE = 1e-14
+"""As in the model, see `add_trial_options`; MuJoCo Warp would raise it to 1e-6."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Room for the contacts of a world.
+
+    Attributes:
+        rows: number of constraint rows, three a contact; a power of two, as kernels are compiled
+            for it.
+        contacts: contacts, or pairs of geoms that are near, a world on the average.
+    """
+
+    rows: int = 512
+    contacts: int = 192
+
+    def times(self, factor: int) -> Room:
+        """Some times the room."""
+        return Room(factor * self.rows, factor * self.contacts)
+
+    @classmethod
+    def for_counts(cls, rows: int, contacts: float) -> Room:
+        """Room for this many, with a reserve.
+
+        Args:
+            rows: largest number of rows of a world.
+            contacts: largest number of contacts of all worlds, divided by that of worlds.
+        """
+        reserve = 1.25
+        enough = 64
+        while enough < reserve * rows:
+            enough *= 2
+        return cls(enough, max(int(np.ceil(reserve * contacts)) + 16, enough // ROWS + 1))
+
+
+class ParallelWorlds:
+    """Worlds in which only the target can move.
+
+    Args:
+        world: the world on the CPU that they repeat.
+        instance: the target.
+        X_WO: (4, 4) its pose at the start.
+        device: name of the device.
+        approaches: whether trials begin at the pregrasp.
+    """
+
+    def __init__(
+        self,
+        world: MujocoWorld,
+        instance: str,
+        X_WO: Array,
+        device: str,
+        *,
+        approaches: bool,
+    ) -> None:
+        self._device, self._world, self._instance = device, world, instance
+        # Constants of the model depend a little on the pose of the hand, and here on nothing else.
+        world.prepare(instance, np.eye(4), 0.0, np.array((0.0, 0.0, 1.0)), friction=None, mass=None)
+        self._model = _without_gravity(world.model)
+        self._rows, self._contacts = 0, 0.0  # Largest numbers so far, see `Room`.
+        with wp.ScopedDevice(device):
+            self._constants = _constants(world, instance, X_WO, approaches=approaches)
+            self._bodies = self._read_bodies()
+            self._masses = self._read_masses()
+
+    def run(
+        self,
+        starts: TrialStarts,
+        worlds: int,
+        progress: Callable[[], None] | None = None,
+    ) -> TrialEnds:
+        """Executes trials; those with more contacts than there is room for again, with more.
+
+        Args:
+            starts: the trials, at least one.
+            worlds: largest number of worlds.
+            progress: called several times a second.
+
+        Raises:
+            RuntimeError: there is not even memory for a few worlds.
+        """
+        first = 256  # Trials that are executed with room enough for most objects.
+        every, ends = np.arange(len(starts)), _empty_ends(len(starts))
+        if self._rows == 0:
+            self._run_rows(starts, every[:first], ends, worlds, Room(), progress)
+            every = every[first:]
+        room = Room.for_counts(self._rows, self._contacts)
+        if len(every):
+            self._run_rows(starts, every, ends, worlds, room, progress)
+        for factor in (2, 4):
+            rows = np.flatnonzero(ends.end == End.OVERFLOW)
+            if len(rows):
+                self._run_rows(starts, rows, ends, worlds, room.times(factor), progress)
+        return ends
+
+    def _run_rows(
+        self,
+        starts: TrialStarts,
+        rows: Indices,
+        ends: TrialEnds,
+        worlds: int,
+        room: Room,
+        progress: Callable[[], None] | None,
+    ) -> None:
+        """Executes some of the trials and writes how they end; in fewer worlds where there is no
+        memory for so many."""
+        few = 16
+        worlds = min(worlds, len(rows))
+        while True:
+            try:
+                with wp.ScopedDevice(self._device):
+                    batch = _Batch(self, starts.at(rows), worlds, room)
+                    batch.run(progress)
+                    break
+            except RuntimeError as error:
+                if "Failed to allocate" not in str(error) or worlds <= few:
+                    raise
+                worlds //= 2
+        self._rows = max(self._rows, int(batch.counts.rows.numpy()[0]))
+        contacts = float(batch.counts.contacts.numpy()[0]) / worlds
+        self._contacts = max(self._contacts, contacts)
+        batch.write_ends(ends, rows)
+
+    def model_with(self, worlds: int) -> tuple[mujoco.MjModel, mujoco_warp.Model]:
+        """The model on the CPU and on the device."""
+        model = mujoco_warp.put_model(self._model, batch_sizes=dict.fromkeys(PER_WORLD, worlds))
+        model.opt.tolerance.fill_(TOLERANCE)
+        model.opt.warn_overflow = 0
+        return self._model, model
+
+    @property
+    def shared(self) -> tuple[Constants, Bodies, Masses]:
+        """What all trials share."""
+        return self._constants, self._bodies, self._masses
+
+    @property
+    def sphere_count(self) -> int:
+        """Number of spheres of both pads."""
+        return sum(map(len, self._world.index.spheres))
+
+    def _read_bodies(self) -> Bodies:
+        world, index, model = self._world, self._world.index, self._model
+        of_geom = np.array(model.geom_bodyid)
+        of_geom[of_geom == 0] = index.table
+        sphere, finger = np.full(model.ngeom, -1), np.zeros(model.ngeom, dtype=int)
+        sphere[np.concatenate(index.spheres)] = np.arange(self.sphere_count)
+        for k, spheres in enumerate(index.spheres):
+            finger[spheres] = k
+        own, table = world.own_friction(self._instance)
+        pair_friction = np.full(model.npair, -1.0)
+        pair_friction[index.pairs.get(self._instance, [])] = table
+        flags = np.zeros((2, model.nbody), dtype=int)
+        for row, named in enumerate((world.standing, world.fixed)):
+            flags[row, [int(body) for body in named.values()]] = 1
+        bodies = Bodies()
+        for name, values in {
+            "of_geom": of_geom,
+            "standing": flags[0],
+            "fixed": flags[1],
+            "sphere": sphere,
+            "finger": finger,
+        }.items():
+            setattr(bodies, name, wp.array(values, dtype=int))
+        bodies.friction = wp.array(np.where(np.isnan(own), -1.0, own), dtype=wp.float64)
+        bodies.pair_friction = wp.array(pair_friction, dtype=wp.float64)
+        bodies.qpos = wp.array(world.data.qpos, dtype=float)
+        bodies.corners = wp.array(world.corners(world.free[self._instance]), dtype=wp.vec3)
+        return bodies
+
+    def _read_masses(self) -> Masses:
+        model, target = self._model, self._constants.target
+        masses = Masses()
+        masses.inertia = wp.vec3(*model.body_inertia[target])
+        masses.mobility = wp.vec2(*model.body_invweight0[target])
+        dof = self._constants.target_dof
+        masses.dof_mobility = wp.spatial_vector(*model.dof_invweight0[dof : dof + 6])
+        return masses
+
+
+class _Batch:
+    """Worlds that execute some trials."""
+
+    def __init__(self, worlds: ParallelWorlds, starts: TrialStarts, count: int, room: Room) -> None:
+        model, self._model = worlds.model_with(count)
+        contacts = max(room.contacts, room.rows // ROWS + 1)
+        self._data = mujoco_warp.make_data(model, nworld=count, nconmax=contacts, njmax=room.rows)
+        self._physics = physics_of(self._model, self._data)
+        self._constants, self._bodies, self._masses = worlds.shared
+        self._trials = _trials(starts)
+        self._state = _state(count, int(self._constants.steady_checks), worlds.sphere_count)
+        self.counts = Counts()
+        for name in element_types(Counts):
+            setattr(self.counts, name, wp.zeros(1, dtype=int))
+        self._worlds, self._size = count, len(starts)
+
+    def run(self, progress: Callable[[], None] | None) -> None:
+        """Executes the trials. The first check also compiles the kernels."""
+        self._begin_trials()
+        with fixed_order(self._data):
+            self._advance()
+            with wp.ScopedCapture() as capture:
+                self._advance()
+        done = 0
+        while done < self._size:
+            for _ in range(CHECKS_PER_LOOK):
+                wp.capture_launch(capture.graph)
+            done = int(self.counts.done.numpy()[0])
+            if progress is not None:
+                progress()
+
+    def write_ends(self, ends: TrialEnds, rows: Indices) -> None:
+        """Writes how the trials ended into rows of all ends."""
+        for field in fields(TrialEnds):
+            getattr(ends, field.name)[rows] = getattr(self._trials, field.name).numpy()
+
+    def _advance(self) -> None:
+        """Advances all worlds to the next check, and evaluates it."""
+        c, data, physics = self._constants, self._data, self._physics
+        for _ in range(int(c.steps_per_check)):
+            wp.launch(
+                trial_kernels.command_lift,
+                dim=self._worlds,
+                inputs=[c, self._trials, self._state, physics],
+            )
+            mujoco_warp.step(self._model, data)
+        contact = data.contact
+        found = [contact.dist, contact.frame, contact.geom, contact.worldid, contact.efc_address]
+        wp.launch(
+            trial_kernels.read_contacts,
+            dim=data.naconmax,
+            inputs=[c, self._bodies, self._state, physics, data.naconmax, *found, data.efc.force],
+        )
+        wp.launch(
+            trial_kernels.judge,
+            dim=self._worlds,
+            inputs=[c, self._bodies, self._trials, self._state, physics, self.counts],
+        )
+        self._begin_trials()
+
+    def _begin_trials(self) -> None:
+        shared = [self._constants, self._bodies, self._masses]
+        wp.launch(
+            trial_kernels.begin_trials,
+            dim=self._worlds,
+            inputs=[*shared, self._trials, self._state, self._physics, self.counts],
+        )
+
+
+def _without_gravity(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy without gravity, which acts on the target alone, as a force: MuJoCo Warp compensates
+    the hand's by sums in any order."""
+    copied = copy.copy(model)
+    copied.opt.gravity[:] = 0.0
+    copied.body_gravcomp[:] = 0.0
+    copied.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # not known to Warp
+    return copied
+
+
+def _constants(world: MujocoWorld, instance: str, X_WO: Array, *, approaches: bool) -> Constants:
+    settings, step, index = world.settings, world.engine.time_step, world.index
+    hand = world.hand_document
+    model, c = world.model, Constants()
+    timeout = max(settings.close_timeout, 2.0 * hand.closing_time)
+    c.step, c.poll, c.hold_time = step, settings.poll, settings.hold_time
+    c.steps_per_check = max(1, round(settings.poll / step))
+    c.close_timeout = int(np.ceil(timeout / settings.poll - 1e-9))
+    c.settled_checks = int(np.ceil(settings.settled_time / settings.poll - 1e-6))
+    c.hold_checks = max(1, round(settings.hold_time / settings.poll))
+    c.steady_checks = settings.steady_polls
+    c.settled_speed = settings.settled_speed
+    c.creep_per_check = settings.creep_speed * settings.poll
+    c.slip_limit, c.tilt_limit = settings.slip_limit, settings.tilt_limit
+    c.carried_mass = world.carried_mass
+    c.early, c.approaches = int(not world.engine.whole_trial), int(approaches)
+    c.overflows = int(OVERFLOWS)
+    c.target = index.objects[instance]
+    c.hand, (c.finger_1, c.finger_2) = index.hand, index.fingers
+    c.carrier, c.table = index.carrier, index.table
+    c.lift_joint, c.lift_qpos, c.lift_dof = index.lift_joint, index.lift_qpos, index.lift_dof
+    c.lift_position_servo, c.lift_speed_servo = index.lift_position_servo, index.lift_speed_servo
+    c.finger_qpos = wp.vec2i(*index.finger_qpos.tolist())
+    c.finger_dof = wp.vec2i(*index.finger_dofs.tolist())
+    c.finger_servo = wp.vec2i(*index.finger_servos.tolist())
+    c.closing_speed = wp.vec2(*world.closing_speeds.tolist())
+    c.target_dof = int(model.body_dofadr[c.target])
+    c.target_mass = float(model.body_mass[c.target])
+    c.gravity = wp.vec3(*model.opt.gravity)
+    X_HG = hand.X_HG.matrix()
+    c.p_HG, c.q_HG = wp.vec3(*X_HG[:3, 3]), wp.quat(*_quaternions(X_HG[:3, :3]))
+    c.p_WO, c.q_WO = wp.vec3(*X_WO[:3, 3]), wp.quat(*_quaternions(X_WO[:3, :3]))
+    c.center = wp.vec3(*world.center(world.free[instance]))
+    return c
+
+
+def _quaternions(R: Array) -> Array:
+    """Rotations (..., 3, 3) as quaternions (..., 4) of Warp, xyzw."""
+    return np.asarray(Rotation.from_matrix(R).as_quat())
+
+
+def _trials(starts: TrialStarts) -> Trials:
+    """The trials on the device."""
+    trials, n = Trials(), len(starts)
+    trials.p_WH = wp.array(starts.p_WH, dtype=wp.vec3)
+    trials.q_WH = wp.array(_quaternions(starts.R_WH), dtype=wp.quat)
+    trials.p_GO = wp.array(starts.p_GO, dtype=wp.vec3)
+    trials.q_GO = wp.array(_quaternions(starts.R_GO), dtype=wp.quat)
+    trials.fingers = wp.array(starts.fingers, dtype=wp.vec2)
+    trials.friction = wp.array(starts.friction, dtype=wp.float64)
+    trials.mass = wp.array(starts.mass, dtype=float)
+    trials.pads = wp.array(starts.pads, dtype=wp.vec3)
+    trials.early = wp.array(starts.early, dtype=int)
+    trials.ways = wp.array(starts.ways, dtype=wp.vec4)
+    trials.checks = wp.array(starts.checks, dtype=int)
+    trials.time = wp.array(starts.time, dtype=float)
+    for field in fields(TrialEnds):
+        setattr(trials, field.name, wp.zeros(n, dtype=element_types(Trials)[field.name]))
+    return trials
+
+
+def _empty_ends(size: int) -> TrialEnds:
+    """Ends of trials that are not executed yet."""
+    kinds = element_types(Trials)
+    return TrialEnds(
+        *(wp.zeros(size, dtype=kinds[f.name], device="cpu").numpy() for f in fields(TrialEnds))
+    )
+
+
+def _state(worlds: int, steady_checks: int, spheres: int) -> WorldStates:
+    """Worlds without trials."""
+    columns = {"motions": steady_checks, "seen": spheres, "touch": 2, "force": 2, "spheres": 2}
+    state = WorldStates()
+    for name, kind in element_types(WorldStates).items():
+        shape = (worlds, columns[name]) if name in columns else (worlds,)
+        setattr(state, name, wp.zeros(shape, dtype=kind))
+    state.phase.fill_(IDLE)
+    return state

@@ -1,0 +1,319 @@
+"""Trials in parallel worlds: statics, what they share with those one by one, and their bits.
+
+All run on Warp's CPU device. The order of threads on a card is another matter, so one test turns
+the order of contacts around.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import asdict, fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, PAD, from_above, lifting, make_station
+
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    MissingDependencyError,
+    Outcome,
+    Pose,
+    swap_fingers,
+)
+from burg_drake.scene import Instance, Scene
+from burg_drake.simulation import DEFAULT_TRIAL, BatchTrial, MujocoTrial, TrialResult
+from burg_drake.station import ENGINES, GraspMotion, Obstacle
+
+parallel_worlds = pytest.importorskip("burg_drake.simulation.batch.parallel_worlds")
+wp = pytest.importorskip("warp")
+mujoco_warp = pytest.importorskip("mujoco_warp")
+
+LOAD = GRAVITY + DEFAULT_TRIAL.acceleration
+"""Weight and inertia of a mass while the hand accelerates [m/s^2]."""
+LIMIT = BOX_MASS * LOAD / (2 * FORCE)
+"""Friction with which the pads just carry the box."""
+LEVER = 0.04
+"""From the middle of the bar to where it is gripped [m]."""
+
+
+def batch_of(scene: Scene, **more: Any) -> BatchTrial:
+    station = more.pop("station", None) or make_station()
+    return BatchTrial(scene, station, device="cpu", **more)
+
+
+@pytest.fixture(scope="module")
+def scene(make_scene) -> Scene:
+    """Box, bar and ball, far apart."""
+    return make_scene(("box", 0.1, 0.2, 0.0), ("bar", 0.3, 0.2, 0.0), ("ball", 0.5, 0.2, 0.0))
+
+
+def exact(result: TrialResult) -> dict[str, str]:
+    """All that a trial returns, to the bit."""
+    words = {"outcome": str(result.outcome), "blocker": result.blocker, "reason": result.reason}
+    numbers = asdict(result.margins) | {"confidence": result.confidence or np.nan}
+    return words | {name: float(value).hex() for name, value in numbers.items()}
+
+
+GRASPS = [
+    (CENTRE, 0.98 * LIMIT, BOX_MASS),
+    (CENTRE, 1.02 * LIMIT, BOX_MASS),
+    (CENTRE, 0.98 * 2.0 * LIMIT, 2.0 * BOX_MASS),
+    (CENTRE, 1.02 * 2.0 * LIMIT, 2.0 * BOX_MASS),
+    (CENTRE, 0.5, BOX_MASS),
+    (from_above(0.06, y=0.01, yaw=0.1), 0.15, BOX_MASS),
+    (swap_fingers(from_above(0.06, y=0.01, yaw=0.1)), 0.15, BOX_MASS),
+    (from_above(0.065, y=0.035), 0.15, BOX_MASS),
+    (from_above(0.12), 0.5, BOX_MASS),
+    (from_above(0.0), 0.5, BOX_MASS),
+]
+"""Grasps of the box with friction and mass: statics, symmetry, an empty one and one in
+collision."""
+
+
+@pytest.fixture(scope="module")
+def columns() -> tuple[Array, Array, Array]:
+    X_OG, friction, mass = zip(*GRASPS, strict=True)
+    return np.array(X_OG), np.array(friction), np.array(mass)
+
+
+@pytest.fixture(scope="module")
+def results(scene: Scene, columns) -> list[TrialResult]:
+    X_OG, friction, mass = columns
+    return batch_of(scene).run("box", X_OG, friction=friction, mass=mass)
+
+
+# --- statics --------------------------------------------------------------------------------------
+
+
+def test_holds_up_to_coulombs_limit_for_any_mass(results: list[TrialResult]) -> None:
+    outcomes = [result.outcome for result in results[:4]]
+    assert outcomes == 2 * [Outcome.SLIPPED, Outcome.LIFTED]
+    assert results[1].margins.lift == pytest.approx(0.30, abs=2e-3)
+
+
+def test_pads_press_with_the_commanded_force_and_their_whole_faces(
+    results: list[TrialResult],
+) -> None:
+    margins = results[4].margins
+    assert margins.pad_force == pytest.approx(FORCE, rel=2e-3)
+    assert margins.patch_area == pytest.approx(PAD[0] * PAD[1], rel=1e-9)
+    assert margins.slip < 5e-5 and margins.tilt < np.deg2rad(0.1)
+
+
+def test_the_same_with_fingers_swapped(results: list[TrialResult]) -> None:
+    one, other = results[5:7]
+    assert one.outcome is other.outcome
+    assert other.margins.tilt == pytest.approx(one.margins.tilt, abs=np.deg2rad(1.0))
+    assert other.margins.slip == pytest.approx(one.margins.slip, abs=2e-4)
+
+
+# --- as one by one --------------------------------------------------------------------------------
+
+
+def assert_alike(one: TrialResult, other: TrialResult) -> None:
+    """Up to rounding; not how far something fell that was lost."""
+    assert (one.outcome, one.blocker) == (other.outcome, other.blocker)
+    assert (one.displacements, one.turned) == (other.displacements, other.turned)
+    assert one.grip_start == pytest.approx(other.grip_start, abs=1e-9)
+    mine, theirs = asdict(one.margins), asdict(other.margins)
+    for name, tolerance in {
+        "clearance": 0.0,
+        "slip": 5e-5,
+        "tilt": 2e-3,
+        "pad_force": 0.1,
+        "patch_area": 1.5e-5,  # a sphere and a half
+        "lift": 2e-4,
+        "end_time": 0.0201,
+        "others_moved": 0.0,
+        "pushed": 1e-5,
+    }.items():
+        if one.outcome.held or name not in ("slip", "tilt", "lift"):
+            assert mine[name] == pytest.approx(theirs[name], abs=tolerance, nan_ok=True), name
+
+
+def test_results_are_those_of_trials_one_by_one(
+    scene: Scene, columns, results: list[TrialResult]
+) -> None:
+    trial = MujocoTrial(scene, make_station())
+    for result, X_OG, friction, mass in zip(results, *columns, strict=True):
+        assert_alike(result, trial.run("box", X_OG, friction=friction, mass=mass))
+    found = {result.outcome for result in results}
+    assert {Outcome.NO_CONTACT, Outcome.COLLISION_TABLE} <= found
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        GraspMotion(retreat=0.05, lift_height=0.1),
+        GraspMotion(lift_height=0.2, lift_direction=(0.0, 1.0, 1.0)),
+    ],
+)
+def test_other_motions_are_followed(scene: Scene, motion: GraspMotion) -> None:
+    batch = batch_of(scene, motion=motion)
+    (result,) = batch.run("box", CENTRE[None], friction=0.6)
+    assert_alike(result, batch.single.run("box", CENTRE, friction=0.6))
+    assert result.margins.lift == pytest.approx(motion.retreat + motion.lift_height, abs=1e-3)
+    assert batch.on_cpu == 0
+
+
+def test_each_grasp_has_its_own_lift(scene: Scene) -> None:
+    lifts = np.array([0.05, np.nan])
+    short, usual = batch_of(scene).run("box", np.array([CENTRE, CENTRE]), lift=lifts)
+    assert short.margins.lift == pytest.approx(0.05, abs=1e-3)
+    assert usual.margins.lift == pytest.approx(0.30, abs=2e-3)
+
+
+def test_the_hand_can_begin_at_the_pregrasp(scene: Scene) -> None:
+    batch = batch_of(scene, settings=replace(lifting(0.1, 0.7), approach=True))
+    (result,) = batch.run("box", CENTRE[None], friction=0.5)
+    assert_alike(result, batch.single.run("box", CENTRE, friction=0.5))
+    assert result.outcome is Outcome.LIFTED and result.pushed["box"] < 1e-3
+    assert batch.on_cpu == 0
+
+
+@pytest.mark.parametrize("height", [0.30, 0.45])
+def test_a_shelf_in_the_way_ends_the_trial(make_scene, height: float) -> None:
+    """That of a hand that is decided early, too."""
+    shelf = Obstacle(X_WB=Pose((0.3, 0.2, height + 0.01)), size=(0.6, 0.2, 0.02))
+    station = make_station(obstacles={"shelf": shelf})
+    batch = batch_of(make_scene(("box", 0.3, 0.2, 0.0)), station=station)
+    (result,) = batch.run("box", CENTRE[None])
+    assert (result.outcome, result.blocker) == (Outcome.BLOCKED, "shelf")
+    assert_alike(result, batch.single.run("box", CENTRE))
+
+
+def test_a_touched_neighbour_moves(make_scene) -> None:
+    """The fingers centre the box, which pushes a block; this needs the complete world."""
+    beside = Instance(name="beside", object="block", X_SO=Pose((0.207, 0.21, 0.0)))
+    batch = batch_of(make_scene(("box", 0.15, 0.2, 0.0), beside))
+    X_OG = from_above(0.065, x=0.006)
+    (result,) = batch.run("box", X_OG[None])
+    assert result.displacements["beside"] == result.margins.others_moved > 0.001
+    assert exact(result) == exact(batch.single.run("box", X_OG))
+    assert batch.on_cpu == 1
+
+
+def test_fingers_close_as_far_as_one_by_one(scene: Scene) -> None:
+    """But for a step of the search, where they touch by less than counts."""
+    trial = MujocoTrial(scene, make_station())
+    asked = [CENTRE, from_above(0.06, y=0.01, yaw=0.1), from_above(0.12), from_above(0.06, x=0.01)]
+    X_WG = np.array([trial.X_WG("box", X_OG) for X_OG in asked])
+    together = trial.clearance.free_travels(X_WG)
+    each = [trial.clearance.free_travel(X) for X in X_WG]
+    np.testing.assert_allclose(together, each, atol=0.0251)
+    assert len(set(each)) > 2
+
+
+# --- bits -----------------------------------------------------------------------------------------
+
+
+def test_the_same_bits_alone_and_among_others_in_any_order(
+    scene: Scene, columns, results: list[TrialResult]
+) -> None:
+    X_OG, friction, mass = columns
+    order = np.array([7, 1, 4, 0, 5])
+    few = batch_of(scene, worlds=2)
+    again = few.run("box", X_OG[order], friction=friction[order], mass=mass[order])
+    (alone,) = few.run("box", X_OG[[5]], friction=friction[5], mass=mass[5])
+    assert [exact(result) for result in again] == [exact(results[k]) for k in order]
+    assert exact(alone) == exact(results[5])
+
+
+def turned(collision: Callable[[Any, Any], None]) -> Callable[[Any, Any], None]:
+    """Finds collisions, in the opposite order."""
+
+    def collide(model: Any, data: Any) -> None:
+        collision(model, data)
+        contact = data.contact
+        for field in fields(contact):
+            values = getattr(contact, field.name)
+            if getattr(values, "shape", (0,))[0] == data.naconmax:
+                words = flat_words(values)
+                before = wp.clone(words)
+                wp.launch(turn, dim=words.shape, inputs=[data.nacon, before], outputs=[words])
+
+    return collide
+
+
+def flat_words(values: Any) -> Any:
+    """An array on the device as rows of four bytes, in the same memory."""
+    rows = values.shape[0]
+    size = values.capacity // (4 * rows)
+    return wp.array(ptr=values.ptr, dtype=int, shape=(rows, size), device=values.device, copy=False)
+
+
+@wp.kernel(enable_backward=False)
+def turn(nacon: wp.array(dtype=int), before: wp.array2d(dtype=int), after: wp.array2d(dtype=int)):
+    i, k = wp.tid()
+    n = nacon[0]
+    if i < n:
+        after[i, k] = before[n - 1 - i, k]
+
+
+def test_the_same_bits_whatever_the_order_of_contacts(
+    scene: Scene, columns, results: list[TrialResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without `fixed_order` they are others. If not, MuJoCo Warp has learned it, and this room can
+    do without."""
+    from mujoco_warp._src import collision_driver
+
+    X_OG, friction, _ = columns
+    rows = [5, 7]
+    monkeypatch.setattr(collision_driver, "collision", turned(collision_driver.collision))
+    other = batch_of(scene).run("box", X_OG[rows], friction=friction[rows])
+    assert [exact(result) for result in other] == [exact(results[k]) for k in rows]
+    monkeypatch.setattr(parallel_worlds, "fixed_order", lambda data: nullcontext())
+    loose = batch_of(scene).run("box", X_OG[rows], friction=friction[rows])
+    assert [exact(result) for result in loose] != [exact(result) for result in other]
+
+
+def test_worlds_without_room_for_their_contacts_run_again(
+    scene: Scene, columns, results: list[TrialResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The box touches 72 spheres, with three rows each."""
+    X_OG, friction, _ = columns
+    rooms: list[int] = []
+
+    class Narrow(parallel_worlds.Room):
+        def __init__(self, rows: int = 64, contacts: int = 24) -> None:
+            super().__init__(rows, contacts)
+            rooms.append(rows)
+
+    monkeypatch.setattr(parallel_worlds, "Room", Narrow)
+    (result,) = batch_of(scene).run("box", X_OG[[4]], friction=friction[[4]])
+    assert exact(result) == exact(results[4])
+    assert 64 in rooms and max(rooms) >= 256
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+
+def test_a_card_is_needed_and_named(scene: Scene) -> None:
+    if wp.is_cuda_available():
+        pytest.skip("there is a card")
+    with pytest.raises(InvalidInputError, match="needs an NVIDIA card, and there is none here"):
+        BatchTrial(scene, make_station())
+    with pytest.raises(InvalidInputError, match="there is no device 'cuda:7' here; there is cpu"):
+        BatchTrial(scene, make_station(), device="cuda:7")
+
+
+def test_other_versions_are_refused(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("importlib.metadata.version", lambda package: "5.0.0")
+    message = r"needs mujoco-warp 4.0.0; 5.0.0 is installed; .*burg-drake\[gpu\]"
+    with pytest.raises(MissingDependencyError, match=message):
+        batch_of(scene)
+
+
+def test_bad_input_is_refused(scene: Scene) -> None:
+    batch = batch_of(scene)
+    with pytest.raises(InvalidInputError, match="'cup' is not a free instance"):
+        batch.run("cup", CENTRE[None])
+    with pytest.raises(InvalidInputError, match=r"mass is -1\.0 kg"):
+        batch.run("box", CENTRE[None], mass=[-1.0])
+    with pytest.raises(InvalidInputError, match="lift is 0 m and retreat 0 m"):
+        batch.run("box", CENTRE[None], lift=[0.0])
+    assert batch.run("box", np.zeros((0, 4, 4))) == []
+    assert batch.single.engine == ENGINES["mujoco-gpu"]
