@@ -9,7 +9,7 @@ import burg_drake as burg
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "run"
-    few = burg.EvaluationSettings(grasps_per_object=5)
+    few = burg.EvaluationSettings(grasps_per_object=2)
     burg.evaluate("tabletop_six", "panda_tabletop", path, settings=few, progress=False)
 
     run = burg.load_run(path)  # as one would at any later time, on any machine

@@ -14,12 +14,12 @@ with tempfile.TemporaryDirectory() as folder:
     path = Path(folder)
     simulated, tried = path / "simulated", path / "tried"
     scene, station = burg.load_scene("tabletop_close"), burg.load_station("panda_tabletop")
-    grasps = burg.sample_grasps(scene, station, 6, only=["mug", "box"])
+    grasps = burg.sample_grasps(scene, station, 4, only=["mug", "box"])
     for out, engine in ((simulated, "standard"), (tried, "screening")):
         settings = burg.EvaluationSettings(engine=engine, mode="hand")
         burg.evaluate(scene, station, out, grasps=grasps, settings=settings, progress=False)
 
-    chosen = burg.trials.SelectionSettings(per_object=4)
+    chosen = burg.trials.SelectionSettings(per_object=3)
     sheet = burg.trials.plan_trials(simulated, settings=chosen, out=path / "trials.yaml")
     print(f"{len(sheet.trials)} trials, the first one of {sheet.trials[0].grasp}")
     book, robot = burg.trials.TrialBook(path / "trials.yaml"), burg.load_run(tried)

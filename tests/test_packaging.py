@@ -45,6 +45,8 @@ IMPORT_NAMES = {
     "opencv-python-headless": "cv2",
     "pyyaml": "yaml",
     "usd-core": "pxr",
+    "mujoco-warp": "mujoco_warp",
+    "warp-lang": "warp",
 }
 
 try:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence, Set as AbstractSet
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
@@ -20,6 +21,7 @@ from burg_drake.simulation.contacts import (
     touched_bodies,
 )
 from burg_drake.simulation.settings import TrialSettings
+from burg_drake.simulation.swept_boxes import BoxSet, SweptBoxes
 from burg_drake.simulation.trial_execution import HandSegment, SteppedWorld
 from burg_drake.simulation.trial_world import TrialWorld
 from burg_drake.station import (
@@ -50,6 +52,8 @@ class PlacedRobot(Protocol):
         ...
 
 
+MIN_BOX_GAP = 0.002
+"""Metres. Smallest distance between separate boxes."""
 GeometryBox = tuple[GeometryId, tuple[Array, Array]]
 """A collision geometry, and pose (4, 4) and half size (3,) of its bounding box."""
 
@@ -103,7 +107,9 @@ class HandLiftClearance(_LiftClearance):
         self._hand = FloatingHand(station_diagram)
         self._carried_boxes = self._boxes(self._carried)
         self._other_boxes = self._boxes(self._others)
-        target = self._plant.get_body(station_diagram.free[instance])
+        self._index = station_diagram.free[instance]
+        target = self._plant.get_body(self._index)
+        self._swept: SweptBoxes | None = None
         start = target.floating_positions_start() + 4
         self._translations = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
@@ -131,16 +137,49 @@ class HandLiftClearance(_LiftClearance):
                 return False
         return True
 
+    def clearly_free(self, X_WG: Array, X_WO: Array, p_W: Array) -> NDArray[np.bool_]:
+        """Whether paths are free as their swept bounding boxes meet nothing, for many at once.
+
+        Others stand where the document places them. Fingers count at all positions. Where boxes
+        meet, `is_free` looks closer.
+
+        Args:
+            X_WG: (N, 4, 4) grasp frame in the world.
+            X_WO: (N, 4, 4) target in the world.
+            p_W: (N, 3) rest of the path [m].
+        """
+        if self._swept is None:
+            self._swept = self._swept_boxes()
+        return self._swept.are_apart(X_WG, X_WO, p_W, MIN_BOX_GAP)
+
+    def _swept_boxes(self) -> SweptBoxes:
+        """Boxes of the open and of the closed hand, of the target and of all others."""
+        boxes, target = self._carried_boxes, set(collision_geometries(self._plant, {self._index}))
+        X_GB, half = [], []
+        for closed in (0.0, 1.0):
+            self._hand.place(self._plant_context, np.eye(4), closed)
+            query = self._query()
+            for geometry, (X_PB, size) in boxes:
+                if geometry not in target:
+                    X_GB.append(query.GetPoseInWorld(geometry).GetAsMatrix4() @ X_PB)
+                    half.append(size)
+        inspector, of_target = query.inspector(), [box for box in boxes if box[0] in target]
+        X_OB = [inspector.GetPoseInFrame(g).GetAsMatrix4() @ X_PB for g, (X_PB, _) in of_target]
+        return SweptBoxes(
+            BoxSet(np.array(X_GB), np.array(half)),
+            BoxSet(np.array(X_OB), np.array([size for _, (_, size) in of_target])),
+            *_box_bounds(query, self._other_boxes),
+        )
+
     def _boxes_meet(self, p_W: Array) -> bool:
         """Whether the world-aligned bounding box of the moving geometries, swept along a
         displacement (3,), overlaps the box of another geometry."""
-        min_gap = 0.002  # Smallest distance between separate boxes in metres.
         query = self._query()
         low, high = _box_bounds(query, self._carried_boxes)
         low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
         other_low, other_high = _box_bounds(query, self._other_boxes)
-        apart = (low[:, None] > other_high[None] + min_gap) | (
-            other_low[None] > high[:, None] + min_gap
+        apart = (low[:, None] > other_high[None] + MIN_BOX_GAP) | (
+            other_low[None] > high[:, None] + MIN_BOX_GAP
         )
         return not apart.any(axis=2).all()
 

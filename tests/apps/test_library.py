@@ -38,11 +38,10 @@ def test_build_and_list(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
 
 
 def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
-    torus = trimesh.creation.torus(0.04, 0.012)
-    torus.export(tmp_path / "ring.ply")
+    trimesh.creation.torus(0.04, 0.012).export(tmp_path / "ring.stl")
     library = tmp_path / "library"
     masses = ("--mass", "block=0.2", "--mass", "ring=0.1")
-    assert build(mesh, tmp_path / "ring.ply", QUICK, "-o", library, *masses) == 0
+    assert build(mesh, tmp_path / "ring.stl", QUICK, "-o", library, *masses) == 0
     faces = len(load_library(library).mesh("ring/contact.obj").faces)
     expected = [
         "block: gripper pads touch a box, at most ",

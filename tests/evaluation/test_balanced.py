@@ -26,6 +26,7 @@ from burg_drake.evaluation import (
 )
 from burg_drake.scene import Scene, load_scene
 from burg_drake.station import Station, load_station
+from tests.thorough import thorough
 
 OPTIONS = {"grasps_per_object": 4, "until_balanced": 3, "blind": True, "progress": False}
 
@@ -94,7 +95,7 @@ def test_only_what_lacks_something_is_sampled_again(
     assert np.array_equal(whole.grasps.X_OG, run.candidates.grasps.X_OG)
 
 
-@pytest.mark.parametrize("out", ["one", "two"])
+@pytest.mark.parametrize("out", ["one", thorough("two")])
 def test_it_is_the_same_on_any_number_of_workers_and_after_kills(
     scene: Scene, station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, out: str
 ) -> None:

@@ -107,6 +107,7 @@ def test_jobs_are_judged_as_they_are_here(cluster: Cluster, tmp_path: Path) -> N
     assert len({process for _, process in built}) == 2
 
 
+@pytest.mark.thorough
 def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
     kinds = ("segfault", "killed", "spin", "memory")
     how = dict(zip(executed(len(kinds)), kinds, strict=True))

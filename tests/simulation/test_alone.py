@@ -58,7 +58,7 @@ def test_worlds_that_were_dropped_are_built_again_with_the_same_results(
         assert result.outcome is Outcome.LIFTED
         assert found.setdefault(name, repr(result)) == repr(result)
     assert built == ["box", "block", "can", "block"]
-    assert trial._lift_clearance.cache_info().currsize == 2
+    assert trial.lift_clearance.cache_info().currsize == 2
 
 
 def test_contact_at_points_meets_pieces_and_not_the_hull_of_a_surface() -> None:

@@ -28,8 +28,8 @@ def test_unknown_preset() -> None:
     with pytest.raises(UnknownNameError) as error:
         as_engine("standart")
     assert str(error.value) == (
-        "engine 'standart' does not exist; did you mean 'standard'? Known: mujoco, mujoco-gpu, reference,"
-        " screening, standard"
+        "engine 'standart' does not exist; did you mean 'standard'? Known: mujoco, mujoco-gpu,"
+        " reference, screening, standard"
     )
 
 

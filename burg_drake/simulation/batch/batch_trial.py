@@ -37,6 +37,7 @@ from burg_drake.simulation.mujoco_trial import MujocoTrial
 from burg_drake.simulation.mujoco_world import MujocoWorld
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.simulation.trial_result import (
+    GripLoad,
     TrialResult,
     collision_result,
     confidence,
@@ -204,6 +205,9 @@ class _Batch:
     ) -> None:
         self._trial, self._instance = trial, instance
         self._X_OG, self._X_WG, self._loads = X_OG, X_WG, loads
+        X_WO = trial.X_WO(instance)
+        center = trial.scene.entry(instance).mass_properties.center_of_mass
+        self._p_WCm = X_WO[:3, :3] @ center + X_WO[:3, 3]
         self._results: dict[int, TrialResult] = {}
         self._screens: list[Clearance] = []
 
@@ -274,17 +278,31 @@ class _Batch:
     def _record(
         self, rows: Indices, world: MujocoWorld, starts: TrialStarts, ends: TrialEnds
     ) -> Indices:
-        """Records decided trials; returns those that would have ended early on a blocked path."""
+        """Records decided trials; returns those that ended early though their path is blocked."""
+        may_be_blocked = set(self._rows_near_others(rows, starts, ends).tolist())
         blocked = []
         for k, row in enumerate(rows.tolist()):
             end = End(ends.end[k])
             if end in NEEDS_CPU:
                 continue
-            if end is End.HELD_IF_FREE and not self._is_free_ahead(row, k, world, starts, ends):
+            if k in may_be_blocked and not self._is_free_ahead(row, k, world, starts, ends):
                 blocked.append(k)
                 continue
             self._results[row] = self._result(row, k, world, ends)
         return np.array(blocked, dtype=np.intp)
+
+    def _rows_near_others(self, rows: Indices, starts: TrialStarts, ends: TrialEnds) -> Indices:
+        """Trials that ended early, and whose path ahead has to be checked."""
+        early = np.flatnonzero(ends.end == End.HELD_IF_FREE)
+        last = np.where(starts.checks[early, 2] > 0, 2, 1)
+        direction, X_WG = starts.ways[early, last, :3], self._X_WG[rows[early]]
+        X_WG[:, :3, 3] = ends.p_WG[early] + ends.travelled[early, None] * direction
+        X_WO = np.tile(np.eye(4), (len(early), 1, 1))
+        X_WO[:, :3, :3] = Rotation.from_quat(ends.q_WO[early]).as_matrix().reshape(-1, 3, 3)
+        X_WO[:, :3, 3] = ends.p_WO[early]
+        clearance = self._trial.lift_clearance(self._instance)
+        left = ends.left[early, None] * direction
+        return early[~clearance.clearly_free(X_WG, X_WO, left)]
 
     def _is_free_ahead(
         self, row: int, k: int, world: MujocoWorld, starts: TrialStarts, ends: TrialEnds
@@ -328,11 +346,13 @@ class _Batch:
             pushed=max(pushed.values(), default=np.nan),
         )
         grip_start = float(ends.grip_check[k]) * settings.poll
-        load = trial.grip_load(
-            self._instance,
+        load = GripLoad.of(
             self._X_WG[row],
+            self._p_WCm,
             friction=float(self._loads.friction[row]),
+            force=trial.station.hand.force,
             mass=float(self._loads.mass[row]),
+            acceleration=settings.acceleration,
         )
         since_grip = replace(margins, end_time=time - grip_start)
         return TrialResult(
