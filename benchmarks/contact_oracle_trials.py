@@ -19,7 +19,7 @@ from burg_drake.core import Pose, make_pose, resolve_reference
 from burg_drake.objects import ContactKind, load_library
 from burg_drake.pipeline import ObjectSource
 from burg_drake.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation import MujocoTrial, hand_trial_of
+from burg_drake.simulation import BatchTrial, MujocoTrial, hand_trial_of
 from burg_drake.station import ENGINES, Engine, Station
 
 STATION = "panda_tabletop"
@@ -81,6 +81,13 @@ def make_trial(library: str, object: str, pose: int, engine: str) -> burg.HandTr
     return hand_trial_of(Scene(document, opened, Path("oracle")), station, KNOWN[engine])
 
 
+@lru_cache(maxsize=8)
+def make_batch(library: str, object: str, pose: int, engine: str) -> BatchTrial:
+    """The same for an engine with parallel trials, on the CPU."""
+    single = make_trial(library, object, pose, engine)
+    return BatchTrial(single.scene, single.station, engine=engine, device="cpu")
+
+
 def damped(station: Station, folder: Path) -> Station:
     """The station with pads of ten times the dissipation, from a copy of the hand's model."""
     model = resolve_reference(station.hand.model)
@@ -100,8 +107,12 @@ def damped(station: Station, folder: Path) -> Station:
 
 def run_engine(library: str, case: Case, engine: str) -> dict[str, object]:
     """What the engine says about a case."""
-    trial = make_trial(library, case.object, case.pose, engine)
-    result = trial.run("target", case.matrix, friction=case.friction, mass=case.mass)
+    if KNOWN[engine].parallel:
+        batch = make_batch(library, case.object, case.pose, engine)
+        (result,) = batch.run("target", case.matrix[None], friction=case.friction, mass=case.mass)
+    else:
+        trial = make_trial(library, case.object, case.pose, engine)
+        result = trial.run("target", case.matrix, friction=case.friction, mass=case.mass)
     margins = result.margins
     return {
         "lifted": bool(result.outcome.held),

@@ -123,7 +123,10 @@ def test_scenes_of_the_same_name_are_numbered(tmp_path: Path) -> None:
     assert list(suite.scenes()) == ["tabletop_six", "tabletop_six_2"]
 
 
-def test_a_scene_can_be_set_up_from_its_files(tmp_path: Path) -> None:
+def test_a_scene_can_be_set_up_from_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("burg_drake.printout.object_drawings.OUTLINE_RESOLUTION", 1e-3)
     suite = load_suite(suite_file(tmp_path))
     scene = suite.scenes()["tabletop_six"]
     write_suite_scene(suite, scene, tmp_path / "scenes")

@@ -141,7 +141,7 @@ def test_results_are_those_of_trials_one_by_one(
     for result, X_OG, friction, mass in zip(results, *columns, strict=True):
         assert_alike(result, trial.run("box", X_OG, friction=friction, mass=mass))
     found = {result.outcome for result in results}
-    assert {Outcome.NO_CONTACT, Outcome.COLLISION_TABLE} <= found
+    assert Outcome.NO_CONTACT in found and any(one.stage == "clear" for one in found)
 
 
 @pytest.mark.parametrize(

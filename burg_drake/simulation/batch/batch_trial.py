@@ -8,6 +8,7 @@ contacts than fit.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -97,6 +98,7 @@ class BatchTrial:
         worlds: largest number of worlds.
         batch_size: number of grasps beyond which a trial gets hardly cheaper.
         on_cpu: number of grasps that were executed on the CPU so far.
+        feeding_time: CPU time spent so far on screens, starts and results [s].
 
     Raises:
         MissingDependencyError: MuJoCo or Warp are not installed in the required versions.
@@ -120,7 +122,7 @@ class BatchTrial:
         self.worlds = worlds or (WORLDS_ON_A_CARD if on_card else WORLDS_ON_THE_CPU)
         self.batch_size = TRIALS_PER_WORLD * self.worlds
         self.single = MujocoTrial(scene, station, engine=engine, settings=settings, motion=motion)
-        self.on_cpu = 0
+        self.on_cpu, self.feeding_time = 0, 0.0
         self._worlds_of = lru_cache(1)(self._build_worlds)
 
     def run(
@@ -152,7 +154,7 @@ class BatchTrial:
             InvalidInputError: `X_OG` are not poses, `instance` cannot be grasped, a friction
                 coefficient is below 0, a mass is not above 0, or a lift has no length.
         """
-        single = self.single
+        begun, single = time.process_time(), self.single
         X_WO = single.X_WO(instance)
         X_OG = check_pose(np.asarray(X_OG, dtype=float), "X_OG").reshape(-1, 4, 4)
         entry, n = single.scene.entry(instance), len(X_OG)
@@ -174,6 +176,7 @@ class BatchTrial:
             with claimed(self._devices) as device:
                 worlds = self._worlds_of(instance, device.alias)
                 batch.step_worlds(worlds, world, self.worlds, progress)
+        self.feeding_time += time.process_time() - begun - batch.stepping_time
         self.on_cpu += batch.execute_rest()
         return batch.results()
 
@@ -198,6 +201,9 @@ class _Batch:
         instance: the target.
         X_OG, X_WG: (N, 4, 4) grasps in its frame and in the world.
         loads: what differs between them.
+
+    Attributes:
+        stepping_time: CPU time while the worlds were stepped [s].
     """
 
     def __init__(
@@ -210,6 +216,7 @@ class _Batch:
         self._p_WCm = X_WO[:3, :3] @ center + X_WO[:3, 3]
         self._results: dict[int, TrialResult] = {}
         self._screens: list[Clearance] = []
+        self.stepping_time = 0.0
 
     def results(self) -> list[TrialResult]:
         """The results in the order of the grasps."""
@@ -246,16 +253,15 @@ class _Batch:
             progress: see `BatchTrial.run`.
         """
         rows = self._open_rows()
-        if not len(rows):
-            return
         loads = Loads(*(values[rows] for values in vars(self._loads).values()))
         starts = trial_starts(self._trial, world, self._instance, self._X_WG[rows], loads)
-        ends = worlds.run(starts, count, progress)
-        blocked = self._record(rows, world, starts, ends)
-        if len(blocked):
-            again = starts.at(blocked)
-            again = replace(again, early=np.zeros(len(blocked), dtype=bool))
-            self._record(rows[blocked], world, again, worlds.run(again, count))
+        while len(rows):
+            begun = time.process_time()
+            ends = worlds.run(starts, count, progress)
+            self.stepping_time += time.process_time() - begun
+            blocked = self._record(rows, world, starts, ends)
+            rows, starts = rows[blocked], starts.at(blocked)
+            starts = replace(starts, early=np.zeros(len(rows), dtype=bool))
 
     def execute_rest(self) -> int:
         """Executes open grasps on the CPU; returns their number."""
