@@ -33,8 +33,7 @@ print(f"the arm was within {1e3 * result.margins.tracking_error:.1f} mrad of its
 
 # The same motion by sources of your own: connect the arm and the hand, watch in a browser.
 meshcat = Meshcat()
-engine = burg.ENGINES["screening"]
-built = burg.build_station_diagram(scene, station, engine=engine, meshcat=meshcat)
+built = burg.build_station_diagram(scene, station, meshcat=meshcat)
 hand = station.hand
 speed = hand.closing_speed
 opened = [*(finger.open for finger in hand.fingers), speed, speed]  # positions, then velocities

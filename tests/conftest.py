@@ -171,40 +171,6 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="session", autouse=True)
-def meshes_read_once() -> Iterator[None]:
-    """Tests read and refine the same few meshes over and over; each test gets copies of what was
-    read of a file, as long as that is the same."""
-    import trimesh
-
-    from burg_drake.objects import ObjectLibrary
-
-    read, refine = ObjectLibrary.mesh, trimesh.remesh.subdivide_to_size
-    meshes: dict[tuple[Any, ...], Any] = {}
-    refined: dict[tuple[Any, ...], Any] = {}
-
-    def read_once(library: Any, relative: str) -> Any:
-        path = library.path(relative)
-        stat = path.stat()
-        key = (path, stat.st_ino, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size)
-        if key not in meshes:
-            meshes[key] = read(library, relative)
-        return meshes[key].copy()
-
-    def refine_once(vertices: Any, faces: Any, *arguments: Any, **options: Any) -> Any:
-        if options:
-            return refine(vertices, faces, *arguments, **options)
-        key = (vertices.tobytes(), faces.tobytes(), *arguments)
-        if key not in refined:
-            refined[key] = refine(vertices, faces, *arguments)
-        return tuple(part.copy() for part in refined[key])
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ObjectLibrary, "mesh", read_once)
-        patch.setattr(trimesh.remesh, "subdivide_to_size", refine_once)
-        yield
-
-
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
     """What asks for one worker gets this process in its place, for the work beside judging too."""

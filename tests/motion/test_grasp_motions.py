@@ -198,7 +198,6 @@ def test_it_does_not_matter_how_a_grasp_is_given_or_with_what_others(
             np.testing.assert_array_equal(one.path.lift, found[k].path.lift)
 
 
-@pytest.mark.thorough
 def test_a_turned_world_has_the_same_heights(
     scene: Scene, station: Station, grasps: Grasps, found: list[Reach]
 ) -> None:

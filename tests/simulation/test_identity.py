@@ -128,7 +128,6 @@ def load_scene_trial(path: str) -> HandTrial:
     return HandTrial(load_scene(path), make_station(), engine=QUICK)
 
 
-@pytest.mark.thorough
 def test_in_another_process_backwards(scene: Scene, alone) -> None:
     path = json.dumps([str(Path(__file__).parent), *sys.path])
     run = subprocess.run(

@@ -15,7 +15,6 @@ from tests.apps.test_lab_server import free_port, kill, serve_again, start
 from tests.experiment.pages.conftest import made as made, trials as trials
 
 
-@pytest.mark.thorough
 def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> None:
     port = free_port()
     process = start(trials, port)

@@ -339,7 +339,6 @@ def press_until_held(setup: Setup, x: float, y: float, direction: tuple[float, f
             mouse.up()
 
 
-@pytest.mark.thorough
 def test_an_arrow_over_another_object_moves_what_is_selected(setup: Setup) -> None:
     """The can stands behind the box, so that the can's arrow along x is drawn over the box; what
     counts is who moves and along which axis, whatever the browser takes hold of."""
