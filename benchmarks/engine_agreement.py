@@ -174,7 +174,7 @@ def execute_all(trial: BatchTrial, name: str, X_OG: Array, friction: Array) -> l
     results = trial.run(name, X_OG, friction=friction)
     seconds = (time.process_time() - start) / max(1, len(results))
     if trial.on_cpu:
-        print(f"{name}: {trial.on_cpu} of {len(results)} needed the complete world, on the CPU")
+        print(f"{name}: {trial.on_cpu} of {len(results)} were executed on the CPU")
     return [(result, seconds) for result in results]
 
 

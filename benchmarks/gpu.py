@@ -4,8 +4,8 @@
 
 Every object stands in SCENE (tabletop_six). The grasps are clear ones, every second one with less
 friction; if there are fewer than asked for, they are repeated. For each number of worlds a row has
-trials a second of the whole batch, from the grasps to their results, of which so many needed the
-complete world on the CPU; grasps a second that one core feeds (screens, starts and results); and
+trials a second of the whole batch, from the grasps to their results, of which so many were executed
+on the CPU; grasps a second that one core feeds (screens, starts and results); and
 the memory in use on the card. M of the grasps are executed one by one by engines of the CPU, and
 ratios are to one core. On a card the kernels that take most of the time follow. The first batch, a
 small one, compiles the kernels, and is not counted.

@@ -21,10 +21,18 @@ from burg_drake.core import (
     MissingDependencyError,
     Outcome,
     Pose,
+    grasp_from_axes,
     swap_fingers,
 )
 from burg_drake.scene import Instance, Scene
-from burg_drake.simulation import DEFAULT_TRIAL, BatchTrial, MujocoTrial, TrialResult
+from burg_drake.simulation import (
+    DEFAULT_TRIAL,
+    NO_GRIP_LIMITS,
+    BatchTrial,
+    MujocoTrial,
+    TrialResult,
+    TrialSettings,
+)
 from burg_drake.station import ENGINES, GraspMotion, Obstacle
 
 parallel_worlds = pytest.importorskip("burg_drake.simulation.batch.parallel_worlds")
@@ -116,7 +124,9 @@ def test_the_same_with_fingers_swapped(results: list[TrialResult]) -> None:
 def assert_alike(one: TrialResult, other: TrialResult) -> None:
     """Up to rounding; not how far something fell that was lost."""
     assert (one.outcome, one.blocker) == (other.outcome, other.blocker)
-    assert (one.displacements, one.turned) == (other.displacements, other.turned)
+    assert one.toppled == other.toppled
+    for mine, theirs in ((one.displacements, other.displacements), (one.turned, other.turned)):
+        assert mine == pytest.approx(theirs, abs=3e-3)
     assert one.grip_start == pytest.approx(other.grip_start, abs=1e-9)
     mine, theirs = asdict(one.margins), asdict(other.margins)
     for name, tolerance in {
@@ -127,7 +137,7 @@ def assert_alike(one: TrialResult, other: TrialResult) -> None:
         "patch_area": 1.5e-5,  # a sphere and a half
         "lift": 5e-4,
         "end_time": 0.0201,
-        "others_moved": 0.0,
+        "others_moved": 3e-4,
         "pushed": 1e-5,
     }.items():
         if one.outcome.held or name not in ("slip", "tilt", "lift"):
@@ -197,14 +207,49 @@ def test_paths_are_free_at_a_glance_only_below_the_shelf(make_scene) -> None:
     assert free.tolist() == [True, True, False]
 
 
-def test_a_touched_neighbour_moves(make_scene) -> None:
+@pytest.fixture(scope="module")
+def crowd(make_scene) -> BatchTrial:
+    """A block beside the box, lower than the fingers, and one on a second box."""
+    scene = make_scene(
+        ("box", 0.15, 0.2, 0.0),
+        Instance(name="carrier", object="box", X_SO=Pose((0.45, 0.2, 0.0))),
+        Instance(name="beside", object="block", X_SO=Pose((0.207, 0.21, 0.0))),
+        Instance(name="on_top", object="block", X_SO=Pose((0.45, 0.235, 0.08))),
+    )
+    return batch_of(scene, settings=TrialSettings(**NO_GRIP_LIMITS))
+
+
+def test_a_touched_neighbour_moves(crowd: BatchTrial) -> None:
     """The fingers centre the box, which pushes a block; this needs the complete world."""
-    beside = Instance(name="beside", object="block", X_SO=Pose((0.207, 0.21, 0.0)))
-    batch = batch_of(make_scene(("box", 0.15, 0.2, 0.0), beside))
     X_OG = from_above(0.065, x=0.006)
-    (result,) = batch.run("box", X_OG[None])
+    (result,) = crowd.run("box", X_OG[None])
+    assert_alike(result, crowd.single.run("box", X_OG))
     assert result.displacements["beside"] == result.margins.others_moved > 0.001
-    assert exact(result) == exact(batch.single.run("box", X_OG))
+    assert crowd.on_cpu == 0
+
+
+def test_what_lies_on_the_target_goes_up_with_it(crowd: BatchTrial) -> None:
+    X_OG = from_above(0.05, y=-0.03)
+    (result,) = crowd.run("carrier", X_OG[None], friction=0.8)
+    single = crowd.single.run("carrier", X_OG, friction=0.8)
+    assert result.outcome is single.outcome is Outcome.LIFTED_DISTURBED
+    assert result.displacements["on_top"] > 0.2
+    assert result.margins.others_moved == pytest.approx(single.margins.others_moved, abs=0.02)
+
+
+def test_what_the_hand_touches_on_its_way_in_is_executed_on_the_cpu(make_scene) -> None:
+    """A finger meets a rail that it is clear of at both ends of the way."""
+    level = grasp_from_axes((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.04))
+    rail = Obstacle(X_WB=Pose((0.3476, 0.005, 0.04)), size=(0.01, 0.05, 0.02))
+    batch = batch_of(
+        make_scene(("post", 0.3, 0.2, 0.0)),
+        station=make_station(obstacles={"rail": rail}),
+        settings=TrialSettings(approach=True),
+        motion=GraspMotion(standoff=0.30),
+    )
+    (result,) = batch.run("post", level[None])
+    assert (result.outcome, result.blocker) == (Outcome.BLOCKED, "rail")
+    assert exact(result) == exact(batch.single.run("post", level))
     assert batch.on_cpu == 1
 
 

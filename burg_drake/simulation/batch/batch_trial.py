@@ -1,9 +1,10 @@
 """Trials of many grasps at once with the hand alone, on a graphics card.
 
 Screen, phases, decisions and margins are those of `MujocoTrial`; the worlds are stepped together by
-MuJoCo Warp, in which only the target can move. What needs more is executed one by one on the CPU:
-trials in which another object is touched, targets that may lean on one, and worlds that have more
-contacts than fit.
+MuJoCo Warp. Trials begin in worlds in which only the target can move. Where another object is
+touched, or the target may lean on one, all objects can. What is rare is executed one by one on the
+CPU: an approach on which the hand touches something, scenes of more than eight objects, and worlds
+that have more contacts than fit.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ class BatchTrial:
         self.batch_size = TRIALS_PER_WORLD * self.worlds
         self.single = MujocoTrial(scene, station, engine=engine, settings=settings, motion=motion)
         self.on_cpu, self.feeding_time = 0, 0.0
-        self._worlds_of = lru_cache(1)(self._build_worlds)
+        self._worlds_of = lru_cache(2)(self._build_worlds)
 
     def run(
         self,
@@ -171,21 +172,28 @@ class BatchTrial:
         X_WG = np.array([X_WO @ X for X in X_OG]).reshape(-1, 4, 4)
         batch = _Batch(single, instance, X_OG, X_WG, loads)
         batch.screen()
-        world = single.world_of(instance)
-        if set(world.free) == {instance}:
-            with claimed(self._devices) as device:
-                worlds = self._worlds_of(instance, device.alias)
-                batch.step_worlds(worlds, world, self.worlds, progress)
+        for world in dict.fromkeys((single.world_of(instance), single.complete_world)):
+            if batch.has_open and self._fits(world, instance):
+                with claimed(self._devices) as device:
+                    worlds = self._worlds_of(world, instance, device.alias)
+                    batch.step_worlds(worlds, world, self.worlds, progress)
         self.feeding_time += time.process_time() - begun - batch.stepping_time
         self.on_cpu += batch.execute_rest()
         return batch.results()
 
-    def _build_worlds(self, instance: str, device: str) -> ParallelWorlds:
+    def _fits(self, world: MujocoWorld, instance: str) -> bool:
+        """Whether parallel worlds can repeat a world: not where the hand comes to many objects."""
+        max_dofs = 60  # MuJoCo Warp would use sparse matrices, whose sums have no fixed order.
+        if set(world.free) == {instance}:
+            return True
+        return world.model.nv <= max_dofs and not self.single.approaches
+
+    def _build_worlds(self, world: MujocoWorld, instance: str, device: str) -> ParallelWorlds:
         from burg_drake.simulation.batch.parallel_worlds import ParallelWorlds
 
         single = self.single
         return ParallelWorlds(
-            single.world_of(instance),
+            world,
             instance,
             single.X_WO(instance),
             device,
@@ -217,6 +225,11 @@ class _Batch:
         self._results: dict[int, TrialResult] = {}
         self._screens: list[Clearance] = []
         self.stepping_time = 0.0
+
+    @property
+    def has_open(self) -> bool:
+        """Whether there are grasps without a result."""
+        return len(self._results) < len(self._X_WG)
 
     def results(self) -> list[TrialResult]:
         """The results in the order of the grasps."""
@@ -285,7 +298,7 @@ class _Batch:
         self, rows: Indices, world: MujocoWorld, starts: TrialStarts, ends: TrialEnds
     ) -> Indices:
         """Records decided trials; returns those that ended early though their path is blocked."""
-        may_be_blocked = set(self._rows_near_others(rows, starts, ends).tolist())
+        may_be_blocked = set(self._rows_near_others(rows, world, starts, ends).tolist())
         blocked = []
         for k, row in enumerate(rows.tolist()):
             end = End(ends.end[k])
@@ -297,7 +310,9 @@ class _Batch:
             self._results[row] = self._result(row, k, world, ends)
         return np.array(blocked, dtype=np.intp)
 
-    def _rows_near_others(self, rows: Indices, starts: TrialStarts, ends: TrialEnds) -> Indices:
+    def _rows_near_others(
+        self, rows: Indices, world: MujocoWorld, starts: TrialStarts, ends: TrialEnds
+    ) -> Indices:
         """Trials that ended early, and whose path ahead has to be checked."""
         early = np.flatnonzero(ends.end == End.HELD_IF_FREE)
         last = np.where(starts.checks[early, 2] > 0, 2, 1)
@@ -306,6 +321,8 @@ class _Batch:
         X_WO = np.tile(np.eye(4), (len(early), 1, 1))
         X_WO[:, :3, :3] = Rotation.from_quat(ends.q_WO[early]).as_matrix().reshape(-1, 3, 3)
         X_WO[:, :3, 3] = ends.p_WO[early]
+        if len(world.free) > 1:
+            return early
         clearance = self._trial.lift_clearance(self._instance)
         left = ends.left[early, None] * direction
         return early[~clearance.clearly_free(X_WG, X_WO, left)]
@@ -329,12 +346,19 @@ class _Batch:
             return simulation_failure_result(error, self._screens[row], time)
         slip, tilt = float(ends.slip[k]), float(ends.tilt[k])
         has_gripped = slip >= 0.0
+        others = [name for name in world.free if name != self._instance]
+        still = dict.fromkeys(world.standing, 0.0)
+        moved = still | dict(zip(others, ends.others_moved[k].tolist(), strict=True))
+        turned = still | dict(zip(others, ends.others_turned[k].tolist(), strict=True))
+        toppled = [n for n, over in zip(others, ends.others_toppled[k], strict=True) if over]
         outcome = OUTCOMES.get(end)
         if outcome is None:
-            beyond = slip > settings.slip_limit or tilt > settings.tilt_limit
-            outcome = Outcome.LIFTED_TURNED if beyond else Outcome.LIFTED
+            outcome = Outcome.LIFTED
+            if slip > settings.slip_limit or tilt > settings.tilt_limit:
+                outcome = Outcome.LIFTED_TURNED
+            elif max(moved.values(), default=0.0) > settings.disturbance:
+                outcome = Outcome.LIFTED_DISTURBED
         left = float(ends.left[k]) if end is End.HELD_IF_FREE else 0.0
-        still = dict.fromkeys(world.standing, 0.0)
         pushed = {**still, self._instance: float(ends.pushed[k])} if trial.approaches else {}
         margins = Margins(
             overlap=0.0,
@@ -346,8 +370,8 @@ class _Batch:
             if has_gripped
             else np.nan,
             lift=float(ends.lift[k]) + left,
-            others_moved=0.0,
-            others_turned=0.0,
+            others_moved=max(moved.values(), default=0.0),
+            others_turned=max(turned.values(), default=0.0),
             end_time=time,
             pushed=max(pushed.values(), default=np.nan),
         )
@@ -369,23 +393,29 @@ class _Batch:
             blocker=world.body_names[BodyIndex(int(ends.blocker[k]))]
             if outcome is Outcome.BLOCKED
             else "",
-            displacements=still,
-            turned=dict(still),
+            displacements=moved,
+            turned=turned,
+            toppled=", ".join(toppled),
             pushed=pushed,
         )
 
 
 class _HeldTarget:
-    """A target in the hand at the end of a trial; see `PlacedRobot`."""
+    """A target in the hand, and all others, at the end of a trial; see `PlacedRobot`."""
 
     def __init__(self, world: MujocoWorld, instance: str, ends: TrialEnds, k: int) -> None:
-        self.free: Mapping[str, BodyIndex] = {instance: world.free[instance]}
+        self.free: Mapping[str, BodyIndex] = world.free
         self._world, self._ends, self._k = world, ends, k
+        others = [body for name, body in world.free.items() if name != instance]
+        self._number = {body: number for number, body in enumerate(others)}
 
     def X_WB(self, body: BodyIndex) -> Array:
-        """Pose (4, 4) of the target in the world."""
-        R_WO = Rotation.from_quat(self._ends.q_WO[self._k]).as_matrix()
-        return make_pose(R_WO, self._ends.p_WO[self._k])
+        """Pose (4, 4) of a body in the world."""
+        ends, k = self._ends, self._k
+        q, p = ends.q_WO[k], ends.p_WO[k]
+        if body in self._number:
+            q, p = ends.others_q[k, self._number[body]], ends.others_p[k, self._number[body]]
+        return make_pose(Rotation.from_quat(q).as_matrix(), p)
 
     def robot_positions(self, model: str) -> Array | None:
         """Positions of `hand` and `lift`, in the order of a station diagram."""

@@ -23,7 +23,8 @@ class Constants:
         step, poll, hold_time: [s].
         steps_per_check, close_timeout, settled_checks, hold_checks, steady_checks: see
             `TrialSettings`, in steps and checks.
-        settled_speed, creep_per_check, slip_limit, tilt_limit: likewise [m/s, m, m, rad].
+        settled_speed, creep_per_check, rest_per_check, slip_limit, tilt_limit: likewise
+            [m/s, m, m, m, rad].
         carried_mass: of carrier and hand, with the inertia of the drive [kg].
         early: 1 if trials may end early.
         approaches: 1 if trials begin at the pregrasp.
@@ -49,6 +50,7 @@ class Constants:
     steady_checks: int
     settled_speed: float
     creep_per_check: float
+    rest_per_check: float
     slip_limit: float
     tilt_limit: float
     carried_mass: float
@@ -93,6 +95,11 @@ class Bodies:
         pair_friction: (pairs,) coefficient of the table; below 0 where it does not meet the target.
         qpos: (nq,) positions at the start, but for the fingers.
         corners: (K,) corners of the target's hull in its frame.
+        others: (M,) other bodies that can move.
+        others_p, others_q, others_center: (M,) their poses and centres of mass at the start.
+        others_height: (M,) heights of these above their lowest points [m].
+        others_corners: corners of their hulls in their frames, one after the other.
+        others_first: (M + 1,) number of the first corner of each, and of all corners.
     """
 
     of_geom: wp.array(dtype=int)
@@ -104,6 +111,13 @@ class Bodies:
     pair_friction: wp.array(dtype=wp.float64)
     qpos: wp.array(dtype=float)
     corners: wp.array(dtype=wp.vec3)
+    others: wp.array(dtype=int)
+    others_p: wp.array(dtype=wp.vec3)
+    others_q: wp.array(dtype=wp.quat)
+    others_center: wp.array(dtype=wp.vec3)
+    others_height: wp.array(dtype=float)
+    others_corners: wp.array(dtype=wp.vec3)
+    others_first: wp.array(dtype=int)
 
 
 @wp.struct
@@ -131,6 +145,9 @@ class Trials:
         blocker: body that blocks the hand.
         p_WO, q_WO, last_fingers, travelled: state at the end.
         p_WG: where the last segment began.
+        others_moved, others_turned: largest motion of each other body [m, rad].
+        others_toppled: 1 if it has toppled, see `MotionTracker`.
+        others_p, others_q: their poses at the end.
     """
 
     p_WH: wp.array(dtype=wp.vec3)
@@ -161,6 +178,11 @@ class Trials:
     last_fingers: wp.array(dtype=wp.vec2)
     travelled: wp.array(dtype=float)
     p_WG: wp.array(dtype=wp.vec3)
+    others_moved: wp.array2d(dtype=float)
+    others_turned: wp.array2d(dtype=float)
+    others_toppled: wp.array2d(dtype=int)
+    others_p: wp.array2d(dtype=wp.vec3)
+    others_q: wp.array2d(dtype=wp.quat)
 
 
 @wp.struct
@@ -189,6 +211,11 @@ class WorldStates:
         hand_touches: 1 if something touches the hand.
         blocker: the fixed body with the lowest number that touches the hand.
         seen: last check in which each sphere was counted.
+        others_moved, others_turned: see `Trials`.
+        others_over: 1 if it has gone over an edge, or rested at another height.
+        others_tilted: 1 if its vertical axis is no longer vertical.
+        others_last: centre of mass at the last check.
+        others_step: largest motion of such a centre since the check before.
     """
 
     trial: wp.array(dtype=int)
@@ -218,6 +245,12 @@ class WorldStates:
     hand_touches: wp.array(dtype=int)
     blocker: wp.array(dtype=int)
     seen: wp.array2d(dtype=int)
+    others_moved: wp.array2d(dtype=float)
+    others_turned: wp.array2d(dtype=float)
+    others_over: wp.array2d(dtype=int)
+    others_tilted: wp.array2d(dtype=int)
+    others_last: wp.array2d(dtype=wp.vec3)
+    others_step: wp.array(dtype=float)
 
 
 @wp.struct

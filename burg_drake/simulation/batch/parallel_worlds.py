@@ -14,7 +14,7 @@ from mujoco_warp import OverflowType
 from scipy.spatial.transform import Rotation
 
 from burg_drake.core import Array, Indices
-from burg_drake.simulation.batch import trial_kernels
+from burg_drake.simulation.batch import start_kernels, trial_kernels
 from burg_drake.simulation.batch.device_arrays import (
     IDLE,
     PER_WORLD,
@@ -79,7 +79,7 @@ class Room:
 
 
 class ParallelWorlds:
-    """Worlds in which only the target can move.
+    """Worlds of the target alone, or in which all objects can move.
 
     Args:
         world: the world on the CPU that they repeat.
@@ -102,6 +102,7 @@ class ParallelWorlds:
         # Constants of the model depend a little on the pose of the hand, and here on nothing else.
         world.prepare(instance, np.eye(4), 0.0, np.array((0.0, 0.0, 1.0)), friction=None, mass=None)
         self._model = _without_gravity(world.model)
+        self.others = [body for name, body in world.free.items() if name != instance]
         self._rows, self._contacts = 0, 0.0  # Largest numbers so far, see `Room`.
         with wp.ScopedDevice(device):
             self._constants = _constants(world, instance, X_WO, approaches=approaches)
@@ -125,7 +126,7 @@ class ParallelWorlds:
             RuntimeError: there is not even memory for a few worlds.
         """
         first = 256  # Trials that are executed with room enough for most objects.
-        every, ends = np.arange(len(starts)), _empty_ends(len(starts))
+        every, ends = np.arange(len(starts)), _empty_ends(len(starts), len(self.others))
         if self._rows == 0:
             self._run_rows(starts, every[:first], ends, worlds, Room(), progress)
             every = every[first:]
@@ -210,7 +211,24 @@ class ParallelWorlds:
         bodies.pair_friction = wp.array(pair_friction, dtype=wp.float64)
         bodies.qpos = wp.array(world.data.qpos, dtype=float)
         bodies.corners = wp.array(world.corners(world.free[self._instance]), dtype=wp.vec3)
+        self._read_others(bodies)
         return bodies
+
+    def _read_others(self, bodies: Bodies) -> None:
+        """Reads the other bodies that can move, at the start."""
+        world, others = self._world, self.others
+        X_WO = np.array([world.X_WB(body) for body in others]).reshape(-1, 4, 4)
+        center = np.array([world.center(body) for body in others]).reshape(-1, 3)
+        corners = [world.corners(body) for body in others]
+        lowest = [(c @ X[2, :3]).min() + X[2, 3] for c, X in zip(corners, X_WO, strict=True)]
+        bodies.others = wp.array(np.array(others, dtype=int), dtype=int)
+        bodies.others_p = wp.array(X_WO[:, :3, 3], dtype=wp.vec3)
+        bodies.others_q = wp.array(_quaternions(X_WO[:, :3, :3]), dtype=wp.quat)
+        bodies.others_center = wp.array(center, dtype=wp.vec3)
+        bodies.others_height = wp.array(center[:, 2] - np.array(lowest), dtype=float)
+        flat = np.concatenate([np.zeros((0, 3)), *corners])
+        bodies.others_corners = wp.array(flat, dtype=wp.vec3)
+        bodies.others_first = wp.array(np.cumsum([0, *map(len, corners)]), dtype=int)
 
     def _read_masses(self) -> Masses:
         model, target = self._model, self._constants.target
@@ -231,8 +249,10 @@ class _Batch:
         self._data = mujoco_warp.make_data(model, nworld=count, nconmax=contacts, njmax=room.rows)
         self._physics = physics_of(self._model, self._data)
         self._constants, self._bodies, self._masses = worlds.shared
-        self._trials = _trials(starts)
-        self._state = _state(count, int(self._constants.steady_checks), worlds.sphere_count)
+        others = self._others = len(worlds.others)
+        self._trials = _trials(starts, others)
+        steady_checks = int(self._constants.steady_checks)
+        self._state = _state(count, steady_checks, worlds.sphere_count, others)
         self.counts = Counts()
         for name in element_types(Counts):
             setattr(self.counts, name, wp.zeros(1, dtype=int))
@@ -275,6 +295,12 @@ class _Batch:
             dim=data.naconmax,
             inputs=[c, self._bodies, self._state, physics, data.naconmax, *found, data.efc.force],
         )
+        if self._others:
+            wp.launch(
+                trial_kernels.track_others,
+                dim=(self._worlds, self._others),
+                inputs=[c, self._bodies, self._state, physics],
+            )
         wp.launch(
             trial_kernels.judge,
             dim=self._worlds,
@@ -285,7 +311,7 @@ class _Batch:
     def _begin_trials(self) -> None:
         shared = [self._constants, self._bodies, self._masses]
         wp.launch(
-            trial_kernels.begin_trials,
+            start_kernels.begin_trials,
             dim=self._worlds,
             inputs=[*shared, self._trials, self._state, self._physics, self.counts],
         )
@@ -314,6 +340,7 @@ def _constants(world: MujocoWorld, instance: str, X_WO: Array, *, approaches: bo
     c.steady_checks = settings.steady_polls
     c.settled_speed = settings.settled_speed
     c.creep_per_check = settings.creep_speed * settings.poll
+    c.rest_per_check = settings.settled_speed * settings.poll
     c.slip_limit, c.tilt_limit = settings.slip_limit, settings.tilt_limit
     c.carried_mass = world.carried_mass
     c.early, c.approaches = int(not world.engine.whole_trial), int(approaches)
@@ -342,7 +369,7 @@ def _quaternions(R: Array) -> Array:
     return np.asarray(Rotation.from_matrix(R).as_quat())
 
 
-def _trials(starts: TrialStarts) -> Trials:
+def _trials(starts: TrialStarts, others: int) -> Trials:
     """The trials on the device."""
     trials, n = Trials(), len(starts)
     trials.p_WH = wp.array(starts.p_WH, dtype=wp.vec3)
@@ -358,21 +385,30 @@ def _trials(starts: TrialStarts) -> Trials:
     trials.checks = wp.array(starts.checks, dtype=int)
     trials.time = wp.array(starts.time, dtype=float)
     for field in fields(TrialEnds):
-        setattr(trials, field.name, wp.zeros(n, dtype=element_types(Trials)[field.name]))
+        kind, shape = element_types(Trials)[field.name], _ends_shape(field.name, n, others)
+        setattr(trials, field.name, wp.zeros(shape, dtype=kind))
     return trials
 
 
-def _empty_ends(size: int) -> TrialEnds:
+def _ends_shape(name: str, size: int, others: int) -> tuple[int, ...]:
+    """Shape of an array of `TrialEnds`."""
+    return (size, others) if name.startswith("others") else (size,)
+
+
+def _empty_ends(size: int, others: int) -> TrialEnds:
     """Ends of trials that are not executed yet."""
     kinds = element_types(Trials)
-    return TrialEnds(
-        *(wp.zeros(size, dtype=kinds[f.name], device="cpu").numpy() for f in fields(TrialEnds))
+    arrays = (
+        wp.zeros(_ends_shape(f.name, size, others), dtype=kinds[f.name], device="cpu")
+        for f in fields(TrialEnds)
     )
+    return TrialEnds(*(array.numpy() for array in arrays))
 
 
-def _state(worlds: int, steady_checks: int, spheres: int) -> WorldStates:
+def _state(worlds: int, steady_checks: int, spheres: int, others: int) -> WorldStates:
     """Worlds without trials."""
     columns = {"motions": steady_checks, "seen": spheres, "touch": 2, "force": 2, "spheres": 2}
+    columns |= {f"others_{of}": others for of in ("moved", "turned", "over", "tilted", "last")}
     state = WorldStates()
     for name, kind in element_types(WorldStates).items():
         shape = (worlds, columns[name]) if name in columns else (worlds,)

@@ -2,8 +2,8 @@
 
 A check is `TrialSettings.poll` long, as in the other engines. In each step `command_lift` moves the
 carriers. After each check `read_contacts` sums the contacts of each world, `judge` advances its
-phase or ends the trial, and `begin_trials` gives the next trial to worlds that have none. Sums of
-forces are integers, so that they do not depend on the order of their terms.
+phase or ends the trial. Sums of forces are integers, so that they do not depend on the order of
+their terms.
 
 Annotations are not postponed, as Warp reads them.
 """
@@ -17,7 +17,6 @@ from burg_drake.simulation.batch.device_arrays import (
     Check,
     Constants,
     Counts,
-    Masses,
     Physics,
     Trials,
     WorldStates,
@@ -30,18 +29,14 @@ FORCE_UNIT = 1e-6
 """Newton. Unit of summed forces."""
 SLIP_LEVER = 0.01
 """Metres; see `object_motions`."""
+COS_TILTED, MIN_HEIGHT_CHANGE, MIN_HEIGHT_SHARE = 0.70710678, 0.003, 0.1
+"""See `MotionTracker`; the second one in metres."""
 
 
 @wp.func
 def to_xyzw(q: wp.quat):
     """A quaternion of MuJoCo, wxyz, as one of Warp."""
     return wp.quat(q[1], q[2], q[3], q[0])
-
-
-@wp.func
-def to_wxyz(q: wp.quat):
-    """A quaternion of Warp, xyzw, as one of MuJoCo."""
-    return wp.quat(q[3], q[0], q[1], q[2])
 
 
 @wp.func
@@ -153,6 +148,37 @@ def read_contacts(
             wp.atomic_add(state.spheres, w, finger, 1)
 
 
+@wp.kernel(enable_backward=False)
+def track_others(c: Constants, bodies: Bodies, state: WorldStates, physics: Physics):
+    """Tracks the other bodies that can move, as `MotionTracker` does."""
+    w, k = wp.tid()
+    if state.phase[w] == IDLE:
+        return
+    body = bodies.others[k]
+    p, q = physics.xpos[w, body], to_xyzw(physics.xquat[w, body])
+    p_start, q_start = bodies.others_p[k], bodies.others_q[k]
+    farthest, lowest = float(0.0), float(1.0e9)
+    for i in range(bodies.others_first[k], bodies.others_first[k + 1]):
+        at = p + wp.quat_rotate(q, bodies.others_corners[i])
+        was = p_start + wp.quat_rotate(q_start, bodies.others_corners[i])
+        farthest = wp.max(farthest, wp.length(at - was))
+        lowest = wp.min(lowest, at[2])
+    state.others_moved[w, k] = wp.max(state.others_moved[w, k], farthest)
+    turn = rotation_angle(wp.normalize(q * wp.quat_inverse(q_start)))
+    state.others_turned[w, k] = wp.max(state.others_turned[w, k], turn)
+    up = wp.vec3(0.0, 0.0, 1.0)
+    cosine = wp.dot(wp.quat_rotate_inv(q, up), wp.quat_rotate_inv(q_start, up))
+    state.others_tilted[w, k] = 0
+    center, height = physics.xipos[w, body], bodies.others_height[k]
+    if cosine < COS_TILTED:
+        state.others_tilted[w, k] = 1
+        change = wp.abs(center[2] - lowest - height)
+        if change > wp.max(MIN_HEIGHT_CHANGE, MIN_HEIGHT_SHARE * height):
+            state.others_over[w, k] = 1
+    wp.atomic_max(state.others_step, w, wp.length(center - state.others_last[w, k]))
+    state.others_last[w, k] = center
+
+
 @wp.func
 def find(c: Constants, trials: Trials, state: WorldStates, physics: Physics, w: int):
     """Records a check of a world, and returns what it finds."""
@@ -196,16 +222,20 @@ def find_motion(c: Constants, state: WorldStates, physics: Physics, w: int, foun
     p_GO = wp.quat_rotate_inv(q_WG, physics.xpos[w, c.target] - p_WG)
     turn = q_GO * wp.quat_inverse(state.q_last[w])
     moved = wp.length(p_GO - wp.quat_rotate(turn, state.p_last[w]))
-    count = state.motion_count[w]
-    state.motions[w, count % c.steady_checks] = wp.max(moved, rotation_angle(turn) * SLIP_LEVER)
-    state.motion_count[w] = count + 1
+    count = state.motion_count[w] + 1
+    state.motions[w, (count - 1) % c.steady_checks] = wp.max(
+        moved, rotation_angle(turn) * SLIP_LEVER
+    )
+    if state.others_step[w] > c.rest_per_check:
+        count = 0
+    state.motion_count[w] = count
     state.p_last[w] = p_GO
     state.q_last[w] = q_GO
     largest, total = float(0.0), float(0.0)
     for k in range(c.steady_checks):
         largest = wp.max(largest, state.motions[w, k])
         total += state.motions[w, k]
-    found.is_steady = count + 1 >= c.steady_checks and largest <= c.creep_per_check
+    found.is_steady = count >= c.steady_checks and largest <= c.creep_per_check
     found.mean_motion = total / float(c.steady_checks)
     found.p_GO = p_GO
     found.q_GO = q_GO
@@ -378,7 +408,14 @@ def judge_hold(c: Constants, state: WorldStates, w: int, k: Check):
 
 @wp.func
 def end_trial(
-    c: Constants, trials: Trials, state: WorldStates, physics: Physics, w: int, k: Check, end: int
+    c: Constants,
+    bodies: Bodies,
+    trials: Trials,
+    state: WorldStates,
+    physics: Physics,
+    w: int,
+    k: Check,
+    end: int,
 ):
     """Writes how a trial has ended."""
     row = k.trial
@@ -402,6 +439,13 @@ def end_trial(
     )
     trials.travelled[row] = k.travelled
     trials.p_WG[row] = state.p_WG[w]
+    for i in range(bodies.others.shape[0]):
+        other = bodies.others[i]
+        trials.others_moved[row, i] = state.others_moved[w, i]
+        trials.others_turned[row, i] = state.others_turned[w, i]
+        trials.others_toppled[row, i] = state.others_over[w, i] * state.others_tilted[w, i]
+        trials.others_p[row, i] = physics.xpos[w, other]
+        trials.others_q[row, i] = to_xyzw(physics.xquat[w, other])
 
 
 @wp.kernel(enable_backward=False)
@@ -441,7 +485,7 @@ def judge(
     else:
         end = judge_hold(c, state, w, k)
     if end != int(End.RUNNING):
-        end_trial(c, trials, state, physics, w, k, end)
+        end_trial(c, bodies, trials, state, physics, w, k, end)
         state.phase[w] = IDLE
         wp.atomic_add(counts.done, 0, 1)
     clear_check(state, w)
@@ -458,117 +502,4 @@ def clear_check(state: WorldStates, w: int):
     state.other[w] = 0
     state.hand_touches[w] = 0
     state.blocker[w] = NO_BODY
-
-
-@wp.func
-def combined_friction(a: wp.float64, b: wp.float64):
-    """Friction coefficient that Drake uses for two surfaces."""
-    if a + b <= wp.float64(0.0):
-        return wp.float64(0.0)
-    return wp.float64(2.0) * a * b / (a + b)
-
-
-@wp.func
-def set_surfaces(bodies: Bodies, trials: Trials, physics: Physics, w: int, trial: int):
-    """Sets friction for the target's coefficient, and the stiffness of the pads for its mass."""
-    mu = trials.friction[trial]
-    for geom in range(physics.geom_friction.shape[1]):
-        own = bodies.friction[geom]
-        if own < wp.float64(0.0):
-            physics.geom_friction[w, geom][0] = float(mu)
-        else:
-            physics.geom_friction[w, geom][0] = float(combined_friction(own, mu))
-        if bodies.sphere[geom] >= 0:
-            pad = trials.pads[trial, bodies.finger[geom]]
-            physics.geom_solref[w, geom] = wp.vec2(pad[0], pad[1])
-            physics.geom_solimp[w, geom][0] = pad[2]
-            physics.geom_solimp[w, geom][1] = pad[2]
-    for pair in range(physics.pair_friction.shape[1]):
-        own = bodies.pair_friction[pair]
-        if own >= wp.float64(0.0):
-            both = float(combined_friction(own, mu))
-            physics.pair_friction[w, pair][0] = both
-            physics.pair_friction[w, pair][1] = both
-
-
-@wp.func
-def set_mass(c: Constants, masses: Masses, trials: Trials, physics: Physics, w: int, trial: int):
-    """Sets the target's mass; its inertia scales with it."""
-    mass = trials.mass[trial]
-    ratio = mass / c.target_mass
-    physics.body_mass[w, c.target] = mass
-    physics.body_subtreemass[w, c.target] = mass
-    physics.body_inertia[w, c.target] = masses.inertia * ratio
-    physics.body_invweight0[w, c.target] = masses.mobility / ratio
-    for k in range(6):
-        physics.dof_invweight0[w, c.target_dof + k] = masses.dof_mobility[k] / ratio
-    weight = c.gravity * mass
-    physics.xfrc_applied[w, c.target] = wp.spatial_vector(
-        weight[0], weight[1], weight[2], 0.0, 0.0, 0.0
-    )
-
-
-@wp.func
-def set_start(c: Constants, bodies: Bodies, trials: Trials, physics: Physics, w: int, trial: int):
-    """Sets hand, fingers and objects to the start of a trial."""
-    way = trials.ways[trial, 1 - c.approaches]
-    physics.body_pos[w, c.carrier] = trials.p_WH[trial]
-    physics.body_quat[w, c.hand] = to_wxyz(trials.q_WH[trial])
-    physics.jnt_axis[w, c.lift_joint] = wp.vec3(way[0], way[1], way[2])
-    for i in range(physics.qpos.shape[1]):
-        physics.qpos[w, i] = bodies.qpos[i]
-    for i in range(physics.qvel.shape[1]):
-        physics.qvel[w, i] = 0.0
-        physics.qacc_warmstart[w, i] = 0.0
-        physics.qfrc_applied[w, i] = 0.0
-    for i in range(2):
-        physics.qpos[w, c.finger_qpos[i]] = trials.fingers[trial][i]
-        speed = c.closing_speed[i]
-        if c.approaches == 1:
-            physics.ctrl[w, c.finger_servo[i]] = -speed
-        else:
-            physics.ctrl[w, c.finger_servo[i]] = speed
-            physics.qvel[w, c.finger_dof[i]] = speed
-    physics.time[w] = 0.0
-    physics.overflow[w] = 0
-
-
-@wp.kernel(enable_backward=False)
-def begin_trials(
-    c: Constants,
-    bodies: Bodies,
-    masses: Masses,
-    trials: Trials,
-    state: WorldStates,
-    physics: Physics,
-    counts: Counts,
-):
-    """Gives the next trial to each world without one."""
-    w = wp.tid()
-    if state.phase[w] != IDLE or counts.begun[0] >= trials.end.shape[0]:
-        return
-    trial = wp.atomic_add(counts.begun, 0, 1)
-    if trial >= trials.end.shape[0]:
-        return
-    set_start(c, bodies, trials, physics, w, trial)
-    set_surfaces(bodies, trials, physics, w, trial)
-    set_mass(c, masses, trials, physics, w, trial)
-    state.trial[w] = trial
-    state.phase[w] = 1 - c.approaches
-    state.segment[w] = 1 - c.approaches
-    state.check[w] = 0
-    state.in_phase[w] = 0
-    state.step[w] = 0
-    state.slow_since[w] = NO_BODY
-    state.touched[w] = 0
-    state.free_checks[w] = 0
-    state.p_last[w] = trials.p_GO[trial]
-    state.q_last[w] = trials.q_GO[trial]
-    state.motion_count[w] = 0
-    state.center_start[w] = c.center
-    state.followed[w] = 0.0
-    state.p_WG[w] = trials.p_WH[trial] + wp.quat_rotate(trials.q_WH[trial], c.p_HG)
-    state.pushed[w] = 0.0
-    for sphere in range(state.seen.shape[1]):
-        state.seen[w, sphere] = 0
-    clear_check(state, w)
+    state.others_step[w] = 0.0

@@ -100,6 +100,11 @@ class TrialEnds:
     last_fingers: Array
     travelled: Array
     p_WG: Array
+    others_moved: Array
+    others_turned: Array
+    others_toppled: Array
+    others_p: Array
+    others_q: Array
 
 
 @dataclass(frozen=True, eq=False)
