@@ -531,6 +531,7 @@ class HandJudge(StationJudge):
                 friction=column(grasp.friction for grasp in chosen),
                 mass=column(grasp.mass for grasp in chosen),
                 lift=np.array([self._lift_of(grasp) for grasp in chosen]),
+                known_clear=True,
                 progress=partial(report_progress, Stage.EXECUTED),
             )
             for k, grasp, result in zip(rows, chosen, results, strict=True):

@@ -154,6 +154,18 @@ def test_results_are_those_of_trials_one_by_one(
     assert Outcome.NO_CONTACT in found and any(one.stage == "clear" for one in found)
 
 
+def test_what_is_known_to_be_clear_is_not_screened_again(
+    scene: Scene, columns, results: list[TrialResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    X_OG, friction, _ = columns
+    batch = batch_of(scene)
+    monkeypatch.delattr(batch.single.clearance, "_screen")
+    monkeypatch.setattr(batch.single, "closed_before_contacts", lambda name, X_WG: np.zeros(1))
+    (result,) = batch.run("box", X_OG[[4]], friction=friction[4], known_clear=True)
+    assert result.outcome is results[4].outcome
+    assert np.isnan(result.margins.clearance)
+
+
 @pytest.mark.parametrize(
     "motion",
     [

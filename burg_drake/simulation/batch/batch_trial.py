@@ -66,6 +66,8 @@ OUTCOMES = {
     End.BLOCKED: Outcome.BLOCKED,
 }
 """Outcomes of trials in which the target was not held to the end."""
+NOT_SCREENED = Clearance(None, "", 0.0, np.nan, "")
+"""Of an open hand that is known to be clear."""
 NEEDS_CPU = (End.OTHER_TOUCHED, End.UNPLANNED_TOUCH, End.OVERFLOW)
 """Ends of trials that are then executed on the CPU."""
 
@@ -134,6 +136,7 @@ class BatchTrial:
         friction: ArrayLike | None = None,
         mass: ArrayLike | None = None,
         lift: ArrayLike | None = None,
+        known_clear: bool = False,
         progress: Callable[[], None] | None = None,
     ) -> list[TrialResult]:
         """Executes grasps.
@@ -145,6 +148,8 @@ class BatchTrial:
                 and where NaN.
             mass: its masses [kg], likewise.
             lift: lengths of the lift [m], likewise; those of the motion if None, and where NaN.
+            known_clear: whether a screen has found the open hand clear at all grasps; then there is
+                no other one, and `Margins.clearance` is NaN.
             progress: called several times a second; may raise, to end the work.
 
         Returns:
@@ -171,7 +176,7 @@ class BatchTrial:
         # One by one: products of stacked matrices may differ in the last bit.
         X_WG = np.array([X_WO @ X for X in X_OG]).reshape(-1, 4, 4)
         batch = _Batch(single, instance, X_OG, X_WG, loads)
-        batch.screen()
+        batch.screen(known_clear=known_clear)
         for world in dict.fromkeys((single.world_of(instance), single.complete_world)):
             if batch.has_open and self._fits(world, instance):
                 with claimed(self._devices) as device:
@@ -235,10 +240,14 @@ class _Batch:
         """The results in the order of the grasps."""
         return [self._results[k] for k in range(len(self._X_WG))]
 
-    def screen(self) -> None:
-        """Screens the open hand at the grasps and at the starts of their approaches."""
+    def screen(self, *, known_clear: bool) -> None:
+        """Screens the open hand at the grasps, unless it is known to be clear there, and at the
+        starts of their approaches."""
         trial, instance = self._trial, self._instance
-        self._screens = trial.clearance.check_all(instance, self._X_WG)
+        if known_clear:
+            self._screens = [NOT_SCREENED] * len(self._X_WG)
+        else:
+            self._screens = trial.clearance.check_all(instance, self._X_WG)
         for k, screen in enumerate(self._screens):
             if screen.outcome is not None:
                 self._results[k] = collision_result(screen)
