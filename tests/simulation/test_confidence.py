@@ -89,7 +89,8 @@ def test_an_engine_with_settings_of_its_own_has_none(
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("held", [True, False])
 def test_each_preset_is_calibrated(engine: str, held: bool) -> None:
-    curves = calibration()[engine, held]
+    """Trials in parallel have the curves of those one by one."""
+    curves = calibration()[ENGINES[engine].serial.name, held]
     signs = grip_signs(Margins(), GRIP)
     assert curves.keys() <= signs.keys()
     for curve in curves.values():
