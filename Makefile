@@ -15,7 +15,7 @@ LOWEST_TESTS := tests/benchmark/test_adapters.py tests/benchmark/test_burg_plann
 	tests/objects/test_decompose.py::test_a_corner_is_two_bars tests/objects/test_solids.py \
 	tests/objects/test_stable_poses.py::test_probabilities_are_those_of_trimesh \
 	tests/printout/test_board_printout.py::test_words_on_every_page \
-	tests/cameras/test_detection.py tests/simulation/test_batch_trial.py::test_each_grasp_has_its_own_lift tests/simulation/test_drake_quirks.py tests/station/test_hand.py \
+	tests/cameras/test_detection.py tests/simulation/test_drake_quirks.py tests/station/test_hand.py \
 	tests/test_documents.py::test_names_in_the_text_exist tests/test_documents.py::test_yaml_fits_its_schema \
 	tests/test_packaging.py::test_every_module_can_be_imported tests/ui/test_incoming.py tests/ui/test_panels.py \
 	"tests/test_typed_use.py::test_what_is_right_is_accepted_and_what_is_wrong_reported[pyright]"

@@ -61,9 +61,9 @@ def scene_after(work: tuple[Scene, ExecutedGrasp]) -> Scene:
         return scene
     origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
     judge = judge_of_trial(scene, station, trial, origin)
-    verdict = judge_grasp(judge, trial.candidate)
+    judge_grasp(judge, trial.candidate)
     poses = judge.trial.final_poses()
-    if verdict.outcome.held:
+    if trial.verdict.outcome.held:
         poses.pop(trial.instance)
     return settle_after(scene, station, poses, trial.instance)
 

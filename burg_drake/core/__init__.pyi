@@ -76,6 +76,7 @@ from .documents import (
 from .errors import (
     BurgError as BurgError,
     ClusterError as ClusterError,
+    DeviceError as DeviceError,
     DocumentError as DocumentError,
     FieldError as FieldError,
     InvalidInputError as InvalidInputError,

@@ -75,6 +75,10 @@ class SimulationError(BurgError, RuntimeError):
     """A simulation, renderer or worker process failed."""
 
 
+class DeviceError(SimulationError):
+    """A graphics card failed, and with it all that was to be simulated there."""
+
+
 class WorkerDied(SimulationError):
     """A worker process ended during a task, or while it built the task's session.
 

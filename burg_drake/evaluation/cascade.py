@@ -27,7 +27,7 @@ from burg_drake.core import (
     ensure_writable_folder,
     remove_unfinished,
 )
-from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.campaign_folder import Campaign, is_campaign
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
@@ -146,7 +146,13 @@ def evaluate(
     station = as_station(station)
     if executor is None:
         executor = LocalExecutor.of_this_machine(workers)
-        require_device(as_engine(settings.engine), settings.device)
+        if not (Path(out) / RUN_FILE).exists() and not is_campaign(out):
+            require_device(as_engine(settings.engine), settings.device)
+    elif settings.device is not None:
+        raise InvalidInputError(
+            "device names a card of this machine, but the grasps are judged on a cluster; leave"
+            " one of the two out"
+        ).about("device")
     elif workers is not None:
         raise InvalidInputError(
             "give either workers or an executor; an executor has workers of its own"
@@ -156,6 +162,7 @@ def evaluate(
             "until_balanced samples more grasps, but grasps are given; leave out one of the two"
         ).about("until_balanced", "grasps")
     request = RunRequest.of(station, settings, grasps, retry_failed=retry_failed)
+    request = replace(request, local=isinstance(executor, LocalExecutor))
     require_writer(request.settings.table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)

@@ -23,7 +23,7 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from burg_drake.core import (
     BurgError,
@@ -115,13 +115,25 @@ def build_judge(make_judge: Callable[[], Judge]) -> Judge:
         raise SimulationError(f"cannot build the simulation: {one_line(error)}") from error
 
 
-def _screen_batches(judge: Judge) -> tuple[int, ...]:
+class ScreenSize(NamedTuple):
+    """Batch size of a screen.
+
+    Attributes:
+        batch: as in `Screen`.
+        executes: whether it executes the grasps, which takes as long as a trial for some of them.
+    """
+
+    batch: int
+    executes: bool
+
+
+def _screen_sizes(judge: Judge) -> tuple[ScreenSize, ...]:
     """Batch size of each screen."""
-    return tuple(screen.batch for screen in judge.screens)
+    return tuple(
+        ScreenSize(screen.batch, screen.stage is Stage.EXECUTED) for screen in judge.screens
+    )
 
 
-GRASPS_PER_LIMIT = 1024
-"""Grasps screened at a time in the limits of `WorkerLimits`; more have in proportion more time."""
 GRASPS_PER_TASK = 4
 """Grasps handed out at a time: few, so that workers finish together."""
 
@@ -163,6 +175,7 @@ class OpenJob:
         to_judge: grasps to be judged one by one.
         to_screen: queue of each screen.
         batches: batch size of each screen.
+        halves: batches of a screen that killed a worker, in halves, which come first.
         crashes_in_a_row: number of grasps that killed their workers since one was judged.
         failed: whether the job is given up; later results are ignored.
     """
@@ -176,7 +189,8 @@ class OpenJob:
             limits.false_starts,
         )
         self.to_judge = GraspQueue(job.candidates)
-        self.batches: tuple[int, ...] = ()
+        self.batches: tuple[ScreenSize, ...] = ()
+        self.halves: deque[tuple[PendingGrasp, ...]] = deque()
         self.to_screen: list[GraspQueue] = []
         self.crashes_in_a_row = 0
         self.failed = False
@@ -184,9 +198,9 @@ class OpenJob:
     @property
     def waiting(self) -> int:
         """Number of grasps not handed to a worker."""
-        return len(self.to_judge) + sum(map(len, self.to_screen))
+        return len(self.to_judge) + sum(map(len, self.to_screen)) + sum(map(len, self.halves))
 
-    def set_screens(self, batches: tuple[int, ...]) -> None:
+    def set_screens(self, batches: tuple[ScreenSize, ...]) -> None:
         """Sets the screens once the first worker reports them; until then no grasp is screened."""
         if not self.to_screen and batches:
             self.batches = batches
@@ -200,11 +214,13 @@ class OpenJob:
         grasps wait for it. Screening and judging thus alternate, so that the rate of verdicts
         predicts the remaining time.
         """
+        if self.halves:
+            return self.halves.popleft(), True
         if len(self.to_judge) < GRASPS_PER_TASK:
             for k in reversed(range(len(self.batches))):
-                queue = self.to_screen[k]
-                if len(queue) >= self.batches[k] or (queue and not any(self.to_screen[:k])):
-                    return queue.take(self.batches[k]), True
+                queue, size = self.to_screen[k], self.batches[k].batch
+                if len(queue) >= size or (queue and not any(self.to_screen[:k])):
+                    return queue.take(size), True
         return self.to_judge.take(GRASPS_PER_TASK), False
 
     def sort_screened(
@@ -226,6 +242,23 @@ class OpenJob:
         self.failed = True
         self.to_judge = GraspQueue()
         self.to_screen = []
+        self.halves.clear()
+
+    def executes(self, grasps: Sequence[PendingGrasp]) -> bool:
+        """Whether the next screen of these grasps executes them."""
+        number = len(grasps[0][1].decisions)
+        return number < len(self.batches) and self.batches[number].executes
+
+    def screen_again(self, grasps: tuple[PendingGrasp, ...]) -> None:
+        """Queues grasps at whose screening a worker died: many that are executed together in
+        halves, others to be judged one by one, to find the grasp that kills it."""
+        few = 64
+        if self.executes(grasps) and len(grasps) > few:
+            half = len(grasps) // 2
+            self.halves += [grasps[:half], grasps[half:]]
+            return
+        for grasp in grasps:
+            self.to_judge.append(grasp)
 
 
 @dataclass(eq=False)
@@ -295,7 +328,7 @@ class JudgePool:
         self.stopped = False
         self._workers: WorkerPool | None = None
         self._done: SimpleQueue[AssignedWork] = SimpleQueue()
-        self._screens: dict[str, tuple[int, ...]] = {}
+        self._screens: dict[str, tuple[ScreenSize, ...]] = {}
         self._remaining_jobs: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
 
@@ -370,14 +403,15 @@ class JudgePool:
         """Gives a worker grasps of a job, or has it build the judge first."""
         slot.job, slot.started = job, True
         if job.job.key not in self.built_judges(slot) or job.job.key not in self._screens:
-            build: Task[Any] = Task(_screen_batches, session=job.session)
+            build: Task[Any] = Task(_screen_sizes, session=job.session)
             self.submit(slot, [(AssignedWork(slot, job, ()), build)])
             return
         job.set_screens(self._screens[job.job.key])
         grasps, are_screened = job.next_work()
-        # Only trials are so many at a time.
-        share = max(1.0, len(grasps) / GRASPS_PER_LIMIT)
-        limit = TimeLimit(self.limits.cpu * share, self.limits.wall * share)
+        limit = TimeLimit(self.limits.cpu, self.limits.wall)
+        if are_screened and job.executes(grasps):  # the first time it compiles, too
+            cpu, wall = (each * len(grasps) for each in (self.limits.cpu, self.limits.wall))
+            limit = TimeLimit(self.limits.build + cpu, wall)
         if are_screened:
             work = AssignedWork(slot, job, grasps, screening=True)
             task: Task[Any] = Task(screen_grasps, (grasps,), {}, job.session, limit, retries=0)
@@ -416,9 +450,8 @@ class JudgePool:
                 self._screens[job.job.key] = future.result()
                 job.set_screens(future.result())
         elif work.screening:
-            if error is not None:  # judged one by one, to find the grasp that kills the worker
-                for grasp in work.grasps:
-                    job.to_judge.append(grasp)
+            if error is not None:
+                job.screen_again(work.grasps)
                 return
             for candidate, verdict in job.sort_screened(work.grasps, future.result()):
                 yield job.job, candidate, verdict

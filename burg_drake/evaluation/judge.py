@@ -19,12 +19,14 @@ import numpy as np
 from burg_drake.core import (
     MODES,
     Array,
+    DeviceError,
     Findings,
     InvalidInputError,
     MarginNames,
     Mode,
     Outcome,
     Stage,
+    TaskCancelled,
     Verdict,
     merge_findings,
     one_line,
@@ -206,6 +208,10 @@ def screen_grasps(
     Returns:
         State of each grasp with the new decision. On an error each half is screened alone, and so
         on; the grasps that cause the error end in `simulation_failed`.
+
+    Raises:
+        DeviceError: the device of an engine with parallel trials failed.
+        TaskCancelled: the task was cancelled.
     """
     if not grasps:
         return []
@@ -214,6 +220,8 @@ def screen_grasps(
     try:
         asked = [_with_found_lift(candidate, state.decisions) for candidate, state in grasps]
         decisions = screen.ask(asked)
+    except (TaskCancelled, DeviceError):
+        raise
     except Exception as error:
         if len(grasps) > 1:
             half = len(grasps) // 2

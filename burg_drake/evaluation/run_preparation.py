@@ -107,6 +107,7 @@ class RunRequest:
         only: names of objects or instances; all if empty.
         grasps: grasps given by the user; None to sample.
         retry_failed: whether to retry grasps that could not be simulated.
+        local: whether this machine judges, and not a cluster.
     """
 
     station: Station
@@ -118,6 +119,7 @@ class RunRequest:
     only: tuple[str, ...]
     grasps: GraspsLike | None
     retry_failed: bool
+    local: bool = True
 
     @classmethod
     def of(
@@ -280,7 +282,7 @@ class RunRequest:
     def devices(self) -> dict[str, str]:
         """The devices of this machine on which an engine with parallel trials runs, as an entry of
         the versions; none if a cluster has them."""
-        if not self.engine.parallel:
+        if not self.engine.parallel or not self.local:
             return {}
         from burg_drake.simulation import describe_devices, find_devices
 

@@ -35,7 +35,12 @@ from burg_drake.evaluation.campaign_folder import (
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, WriterLock
-from burg_drake.evaluation.judge import StationJudgeFactory, require_engine_for, require_scene_for
+from burg_drake.evaluation.judge import (
+    StationJudgeFactory,
+    require_device,
+    require_engine_for,
+    require_scene_for,
+)
 from burg_drake.evaluation.part_store import keep_parts, update_parts
 from burg_drake.evaluation.report.pages import renew_report
 from burg_drake.evaluation.run_document import (
@@ -121,7 +126,9 @@ def judge_again(
             f"{found.path} is shard {found.document.shard} of a run; merge the shards first"
         )
     _require_complete(found)
-    executor = executor or LocalExecutor.of_this_machine(workers)
+    if executor is None:
+        executor = LocalExecutor.of_this_machine(workers)
+        require_device(ENGINES[engine], None)
     with Reporter(progress) as reporter:
         if isinstance(found, Campaign):
             return _judge_scenes(found, engine, executor, reporter)
@@ -172,7 +179,9 @@ def require_second_engine(engine: str, first: Engine, mode: Mode) -> None:
     second = ENGINES[engine]
     others = ", ".join(name for name, one in ENGINES.items() if _is_finer(one, first))
     if not _is_finer(second, first):
-        why = "is the one" if second == first else "takes longer steps than the one"
+        why = "takes longer steps than the one"
+        if second.serial == first.serial:
+            why = "is the one" if second == first else "has the physics of the one"
         raise InvalidInputError(
             f"engine {engine!r} {why} that has judged all grasps, {first.name!r}; give one of"
             f" {others}"

@@ -155,18 +155,21 @@ class HandLiftClearance(_LiftClearance):
     def _swept_boxes(self) -> SweptBoxes:
         """Boxes of the open and of the closed hand, of the target and of all others."""
         boxes, target = self._carried_boxes, set(collision_geometries(self._plant, {self._index}))
-        X_GB, half = [], []
+        of_hand, ends = [box for box in boxes if box[0] not in target], []
         for closed in (0.0, 1.0):
             self._hand.place(self._plant_context, np.eye(4), closed)
             query = self._query()
-            for geometry, (X_PB, size) in boxes:
-                if geometry not in target:
-                    X_GB.append(query.GetPoseInWorld(geometry).GetAsMatrix4() @ X_PB)
-                    half.append(size)
+            poses = [query.GetPoseInWorld(g).GetAsMatrix4() @ X_PB for g, (X_PB, _) in of_hand]
+            ends.append(np.array(poses))
+        # Around both ends of the way of each part, which does not turn.
+        X_GB, way_G = ends[0].copy(), ends[1][:, :3, 3] - ends[0][:, :3, 3]
+        X_GB[:, :3, 3] += way_G / 2.0
+        way_B = np.einsum("kji,kj->ki", X_GB[:, :3, :3], way_G)
+        half = np.array([size for _, (_, size) in of_hand]) + np.abs(way_B) / 2.0
         inspector, of_target = query.inspector(), [box for box in boxes if box[0] in target]
         X_OB = [inspector.GetPoseInFrame(g).GetAsMatrix4() @ X_PB for g, (X_PB, _) in of_target]
         return SweptBoxes(
-            BoxSet(np.array(X_GB), np.array(half)),
+            BoxSet(X_GB, half),
             BoxSet(np.array(X_OB), np.array([size for _, (_, size) in of_target])),
             *_box_bounds(query, self._other_boxes),
         )

@@ -470,20 +470,21 @@ class MujocoWorld:
         """Sets the stiffness of the pads, which in MuJoCo depends on the body that they touch."""
         model = self.model
         mobility = float(model.body_invweight0[target, 0])
-        for spheres, contact in zip(self.index.spheres, self.pad_contacts(mobility), strict=True):
+        contacts = self.pad_contacts(mobility, model.body_invweight0[self.index.fingers, 0])
+        for spheres, contact in zip(self.index.spheres, contacts, strict=True):
             model.geom_solref[spheres] = contact[:2]
             model.geom_solimp[spheres, :2] = contact[2]
 
-    def pad_contacts(self, mobility: float) -> Array:
+    def pad_contacts(self, mobility: float, fingers_mobility: Array) -> Array:
         """Stiffness, damping and impedance (2, 3) of the pads' contact with a target; see
         `pad_contact`.
 
         Args:
             mobility: inverse mass of the target [1/kg].
+            fingers_mobility: (2,) those of the fingers [1/kg].
         """
-        fingers = self.model.body_invweight0[self.index.fingers, 0]
         contacts = []
-        for finger, own in zip(self._parts.fingers, fingers, strict=True):
+        for finger, own in zip(self._parts.fingers, fingers_mobility.tolist(), strict=True):
             solref, impedance = pad_contact(finger.front, own + mobility, self.engine.time_step)
             contacts.append((*solref, impedance))
         return np.array(contacts)

@@ -54,7 +54,8 @@ def test_device_and_versions_are_recorded(gpu_run: Run) -> None:
 
 def test_a_run_that_is_complete_returns_at_once(gpu_run: Run, arguments: list[str]) -> None:
     before = gpu_run.table_path.stat().st_mtime_ns
-    given = [*arguments, "-o", str(gpu_run.path), "--engine", "mujoco-gpu", "--device", "cpu"]
+    """Without a card, too."""
+    given = [*arguments, "-o", str(gpu_run.path), "--engine", "mujoco-gpu"]
     assert main(given) == 0
     assert gpu_run.table_path.stat().st_mtime_ns == before
 
@@ -71,7 +72,9 @@ def test_contested_grasps_go_to_another_physics(
     """Not to the same one, on the CPU."""
     given = [*arguments, "-o", str(gpu_run.path), "--rejudge", "contested", "--engine", "mujoco"]
     assert main(given) == 2
-    assert "give one of reference, standard, screening" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "'mujoco' has the physics of the one" in err
+    assert "give one of reference, standard, screening" in err
 
 
 def test_without_a_card_one_line_says_so(

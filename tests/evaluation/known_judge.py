@@ -260,6 +260,20 @@ class MakeAndTell:
 
 
 @dataclass(frozen=True)
+class ParallelJudge(CrashingJudge):
+    """Executes grasps as the last screen, many at once."""
+
+    @property
+    def screens(self) -> Sequence[Screen]:
+        last = Screen(Stage.EXECUTED, partial(_all, self.execute), 1000)
+        return [*super().screens, last]
+
+    @property
+    def stages(self) -> Sequence[tuple[Stage, Decide]]:
+        return ()
+
+
+@dataclass(frozen=True)
 class DieOnStart:
     """A factory that ends the process in which it is called for the n-th time, counted in `log`."""
 

@@ -16,6 +16,7 @@ from known_judge import (
     DieOnStart,
     KnownJudge,
     Make,
+    ParallelJudge,
     die,
     expected,
     refuse,
@@ -82,6 +83,16 @@ def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
     }
     others = {c.id: expected(c.id) for c in grasps(20) if c.id not in expect}
     assert {id: v.outcome for id, v in judged.items() if id not in expect} == others
+
+
+def test_of_grasps_that_are_executed_together_a_death_costs_only_its_cause() -> None:
+    """The batch goes through the worker in halves, and at last one by one."""
+    make = Make(ParallelJudge(how=(("cube-0100", "segfault"),), batches=(512, 512)))
+    judged = {c.id: v for c, v in judge_all(grasps(200), make, workers=1)}
+    failed = [id for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED]
+    assert failed == ["cube-0100"]
+    others = {c.id: expected(c.id) for c in grasps(200) if c.id != "cube-0100"}
+    assert {id: v.outcome for id, v in judged.items() if id not in failed} == others
 
 
 def test_grasps_are_screened_together_and_once(tmp_path) -> None:

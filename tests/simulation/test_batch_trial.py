@@ -34,6 +34,7 @@ from burg_drake.simulation import (
     TrialSettings,
 )
 from burg_drake.station import ENGINES, GraspMotion, Obstacle
+from tests.thorough import thorough
 
 parallel_worlds = pytest.importorskip("burg_drake.simulation.batch.parallel_worlds")
 wp = pytest.importorskip("warp")
@@ -170,7 +171,7 @@ def test_what_is_known_to_be_clear_is_not_screened_again(
     "motion",
     [
         GraspMotion(retreat=0.05, lift_height=0.1),
-        GraspMotion(lift_height=0.2, lift_direction=(0.0, 1.0, 1.0)),
+        thorough(GraspMotion(lift_height=0.2, lift_direction=(0.0, 1.0, 1.0))),
     ],
 )
 def test_other_motions_are_followed(scene: Scene, motion: GraspMotion) -> None:
@@ -196,7 +197,7 @@ def test_the_hand_can_begin_at_the_pregrasp(scene: Scene) -> None:
     assert batch.on_cpu == 0
 
 
-@pytest.mark.parametrize("height", [0.30, 0.45])
+@pytest.mark.parametrize("height", [thorough(0.30), 0.45])
 def test_a_shelf_in_the_way_ends_the_trial(make_scene, height: float) -> None:
     """That of a hand that is decided early, too."""
     shelf = Obstacle(X_WB=Pose((0.3, 0.2, height + 0.01)), size=(0.6, 0.2, 0.02))
@@ -205,6 +206,16 @@ def test_a_shelf_in_the_way_ends_the_trial(make_scene, height: float) -> None:
     (result,) = batch.run("box", CENTRE[None])
     assert (result.outcome, result.blocker) == (Outcome.BLOCKED, "shelf")
     assert_alike(result, batch.single.run("box", CENTRE))
+
+
+def test_a_hand_that_goes_down_is_blocked_by_the_table(make_scene) -> None:
+    motion = GraspMotion(lift_height=0.15, lift_direction=(0.0, -1.0, -0.02))
+    batch = batch_of(make_scene(("bar", 0.3, 0.2, 90.0)), motion=motion)
+    X_OG = from_above(0.0105)
+    (result,) = batch.run("bar", X_OG[None], friction=0.5)
+    single = batch.single.run("bar", X_OG, friction=0.5)
+    assert result.outcome is single.outcome is Outcome.BLOCKED
+    assert result.blocker == single.blocker == "table"
 
 
 def test_paths_are_free_at_a_glance_only_below_the_shelf(make_scene) -> None:
@@ -240,6 +251,7 @@ def test_a_touched_neighbour_moves(crowd: BatchTrial) -> None:
     assert crowd.on_cpu == 0
 
 
+@pytest.mark.thorough
 def test_what_lies_on_the_target_goes_up_with_it(crowd: BatchTrial) -> None:
     X_OG = from_above(0.05, y=-0.03)
     (result,) = crowd.run("carrier", X_OG[None], friction=0.8)

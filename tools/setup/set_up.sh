@@ -99,11 +99,11 @@ if [ -n "${LOWEST:-}" ]; then  # pip takes the newest versions alone
     fail "the oldest versions are for Python 3.11 alone; name one:" \
       "make test-lowest PYTHON=/path/to/python3.11"
   fi
-  uv_install --resolution lowest-direct -e '.[dask,dev,frame,gpu,jobqueue,mujoco,parquet,ui,usd]'
+  uv_install --resolution lowest-direct -e '.[dask,dev,frame,jobqueue,mujoco,parquet,ui,usd]'
 # uv takes seconds where pip takes minutes, but knows no index that only pip's configuration names.
-elif ! uv_install -e '.[dev,ui]'; then
+elif ! uv_install -e '.[dev,gpu,ui]'; then
   say "uv cannot install it; trying pip"
-  pip_install -e '.[dev,ui]'
+  pip_install -e '.[dev,gpu,ui]'
 fi
 
 install_system_libraries

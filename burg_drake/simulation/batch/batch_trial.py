@@ -3,7 +3,7 @@
 Screen, phases, decisions and margins are those of `MujocoTrial`; the worlds are stepped together by
 MuJoCo Warp. Trials begin in worlds in which only the target can move. Where another object is
 touched, or the target may lean on one, all objects can. What is rare is executed one by one on the
-CPU: an approach on which the hand touches something, scenes of more than eight objects, and worlds
+CPU: an approach on which the hand touches something, scenes of more than seven objects, and worlds
 that have more contacts than fit.
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,6 +66,8 @@ OUTCOMES = {
     End.BLOCKED: Outcome.BLOCKED,
 }
 """Outcomes of trials in which the target was not held to the end."""
+KEPT_WORLDS = 16
+"""Targets whose constants are kept on the device, some 100 kB each."""
 NOT_SCREENED = Clearance(None, "", 0.0, np.nan, "")
 """Of an open hand that is known to be clear."""
 NEEDS_CPU = (End.OTHER_TOUCHED, End.UNPLANNED_TOUCH, End.OVERFLOW)
@@ -75,8 +77,9 @@ NEEDS_CPU = (End.OTHER_TOUCHED, End.UNPLANNED_TOUCH, End.OVERFLOW)
 class BatchTrial:
     """Executes many grasps of a scene with the hand alone, in parallel worlds.
 
-    Results are those of `MujocoTrial` but for rounding. A grasp has the same result, to the bit,
-    alone or among others, in any order, on the same device with the same versions.
+    Results are those of `MujocoTrial` but for rounding, and for fingers that may start elsewhere by
+    a fortieth of their travel. A grasp has the same result, to the bit, alone or among others, in
+    any order, on the same device with the same versions.
 
     Example::
 
@@ -126,7 +129,7 @@ class BatchTrial:
         self.batch_size = TRIALS_PER_WORLD * self.worlds
         self.single = MujocoTrial(scene, station, engine=engine, settings=settings, motion=motion)
         self.on_cpu, self.feeding_time = 0, 0.0
-        self._worlds_of = lru_cache(2)(self._build_worlds)
+        self._worlds_of = lru_cache(KEPT_WORLDS)(self._build_worlds)
 
     def run(
         self,
@@ -179,16 +182,29 @@ class BatchTrial:
         batch.screen(known_clear=known_clear)
         for world in dict.fromkeys((single.world_of(instance), single.complete_world)):
             if batch.has_open and self._fits(world, instance):
-                with claimed(self._devices) as device:
-                    worlds = self._worlds_of(world, instance, device.alias)
-                    batch.step_worlds(worlds, world, self.worlds, progress)
+                step = partial(self._step_worlds, world, instance, progress)
+                pads = self._worlds_of(world, instance, self._devices[0].alias).pads
+                batch.step_worlds(world, pads, step)
         self.feeding_time += time.process_time() - begun - batch.stepping_time
         self.on_cpu += batch.execute_rest()
         return batch.results()
 
+    def _step_worlds(
+        self,
+        world: MujocoWorld,
+        instance: str,
+        progress: Callable[[], None] | None,
+        starts: TrialStarts,
+    ) -> TrialEnds:
+        """Executes trials on a device that no other process uses."""
+        with claimed(self._devices) as device:
+            worlds = self._worlds_of(world, instance, device.alias)
+            return worlds.run(starts, self.worlds, progress)
+
     def _fits(self, world: MujocoWorld, instance: str) -> bool:
-        """Whether parallel worlds can repeat a world: not where the hand comes to many objects."""
-        max_dofs = 60  # MuJoCo Warp would use sparse matrices, whose sums have no fixed order.
+        """Whether parallel worlds can repeat a world: not one of many objects, nor where the hand
+        comes to them."""
+        max_dofs = 50  # Beyond it MuJoCo Warp adds parts of each row by atomics, in any order.
         if set(world.free) == {instance}:
             return True
         return world.model.nv <= max_dofs and not self.single.approaches
@@ -261,25 +277,24 @@ class _Batch:
 
     def step_worlds(
         self,
-        worlds: ParallelWorlds,
         world: MujocoWorld,
-        count: int,
-        progress: Callable[[], None] | None,
+        pads: Callable[[Array], Array],
+        step: Callable[[TrialStarts], TrialEnds],
     ) -> None:
         """Executes the open grasps in parallel worlds; leaves open what these cannot decide.
 
         Args:
-            worlds: the parallel worlds.
             world: the world that they repeat.
-            count: their number.
-            progress: see `BatchTrial.run`.
+            pads: see `ParallelWorlds.pads`.
+            step: executes trials.
         """
         rows = self._open_rows()
         loads = Loads(*(values[rows] for values in vars(self._loads).values()))
-        starts = trial_starts(self._trial, world, self._instance, self._X_WG[rows], loads)
+        X_WG, instance = self._X_WG[rows], self._instance
+        starts = trial_starts(self._trial, instance, X_WG, loads, pads(loads.mass))
         while len(rows):
             begun = time.process_time()
-            ends = worlds.run(starts, count, progress)
+            ends = step(starts)
             self.stepping_time += time.process_time() - begun
             blocked = self._record(rows, world, starts, ends)
             rows, starts = rows[blocked], starts.at(blocked)
@@ -349,7 +364,9 @@ class _Batch:
     def _result(self, row: int, k: int, world: MujocoWorld, ends: TrialEnds) -> TrialResult:
         """The result of a trial, as `Execution` has it."""
         trial, settings, end = self._trial, self._trial.settings, End(ends.end[k])
-        time = float(ends.check[k]) * settings.poll
+        step = trial.engine.time_step
+        check_time = max(1, round(settings.poll / step)) * step
+        time = float(ends.check[k]) * check_time
         if end is End.NOT_FINITE:
             error = RuntimeError(f"the state is not finite at {time:.3f} s")
             return simulation_failure_result(error, self._screens[row], time)
@@ -384,7 +401,7 @@ class _Batch:
             end_time=time,
             pushed=max(pushed.values(), default=np.nan),
         )
-        grip_start = float(ends.grip_check[k]) * settings.poll
+        grip_start = float(ends.grip_check[k]) * check_time
         load = GripLoad.of(
             self._X_WG[row],
             self._p_WCm,

@@ -209,7 +209,8 @@ class WorldStates:
         outside: 1 if something else touches hand or target.
         other: 1 if it can move only in the complete world.
         hand_touches: 1 if something touches the hand.
-        blocker: the fixed body with the lowest number that touches the hand.
+        blocker: the fixed body, but for the table, with the lowest number that touches the hand.
+        on_table: 1 if the table does.
         seen: last check in which each sphere was counted.
         others_moved, others_turned: see `Trials`.
         others_over: 1 if it has gone over an edge, or rested at another height.
@@ -244,6 +245,7 @@ class WorldStates:
     other: wp.array(dtype=int)
     hand_touches: wp.array(dtype=int)
     blocker: wp.array(dtype=int)
+    on_table: wp.array(dtype=int)
     seen: wp.array2d(dtype=int)
     others_moved: wp.array2d(dtype=float)
     others_turned: wp.array2d(dtype=float)

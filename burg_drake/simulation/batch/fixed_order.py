@@ -190,12 +190,11 @@ def _take_rows(
     w, first = worldid[i], efc_address[i, 0]
     wp.atomic_add(nefc, w, ROWS)
     for k in range(ROWS):
-        row = first + k
-        if row >= njmax:
+        if first + ROWS > njmax:
             efc_address[i, k] = -1
         else:
-            efc_address[i, k] = row
-            efc_id[w, row] = i
+            efc_address[i, k] = first + k
+            efc_id[w, first + k] = i
 
 
 @wp.kernel(enable_backward=False)

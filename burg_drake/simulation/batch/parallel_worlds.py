@@ -13,7 +13,7 @@ import warp as wp
 from mujoco_warp import OverflowType
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import Array, Indices
+from burg_drake.core import Array, DeviceError, Indices, one_line
 from burg_drake.simulation.batch import start_kernels, trial_kernels
 from burg_drake.simulation.batch.device_arrays import (
     IDLE,
@@ -59,10 +59,6 @@ class Room:
     rows: int = 512
     contacts: int = 192
 
-    def times(self, factor: int) -> Room:
-        """Some times the room."""
-        return Room(factor * self.rows, factor * self.contacts)
-
     @classmethod
     def for_counts(cls, rows: int, contacts: float) -> Room:
         """Room for this many, with a reserve.
@@ -101,7 +97,11 @@ class ParallelWorlds:
         self._device, self._world, self._instance = device, world, instance
         # Constants of the model depend a little on the pose of the hand, and here on nothing else.
         world.prepare(instance, np.eye(4), 0.0, np.array((0.0, 0.0, 1.0)), friction=None, mass=None)
-        self._model = _without_gravity(world.model)
+        self._model = model = _without_gravity(world.model)
+        target = world.index.objects[instance]
+        self._target_mass = float(model.body_mass[target])
+        self._mobility = float(model.body_invweight0[target, 0])
+        self._fingers_mobility = np.array(model.body_invweight0[world.index.fingers, 0])
         self.others = [body for name, body in world.free.items() if name != instance]
         self._rows, self._contacts = 0, 0.0  # Largest numbers so far, see `Room`.
         with wp.ScopedDevice(device):
@@ -123,20 +123,25 @@ class ParallelWorlds:
             progress: called several times a second.
 
         Raises:
-            RuntimeError: there is not even memory for a few worlds.
+            DeviceError: the device fails, or has not even memory for a few worlds.
         """
         first = 256  # Trials that are executed with room enough for most objects.
         every, ends = np.arange(len(starts)), _empty_ends(len(starts), len(self.others))
         if self._rows == 0:
             self._run_rows(starts, every[:first], ends, worlds, Room(), progress)
             every = every[first:]
-        room = Room.for_counts(self._rows, self._contacts)
         if len(every):
+            room = Room.for_counts(self._rows, self._contacts)
             self._run_rows(starts, every, ends, worlds, room, progress)
-        for factor in (2, 4):
+        for factor in (1, 2):
             rows = np.flatnonzero(ends.end == End.OVERFLOW)
             if len(rows):
-                self._run_rows(starts, rows, ends, worlds, room.times(factor), progress)
+                usual = Room()
+                room = Room.for_counts(
+                    factor * max(self._rows, usual.rows),
+                    factor * max(self._contacts, usual.contacts),
+                )
+                self._run_rows(starts, rows, ends, worlds, room, progress)
         return ends
 
     def _run_rows(
@@ -153,19 +158,32 @@ class ParallelWorlds:
         few = 16
         worlds = min(worlds, len(rows))
         while True:
+            batch = None  # so that its memory is free
             try:
                 with wp.ScopedDevice(self._device):
                     batch = _Batch(self, starts.at(rows), worlds, room)
                     batch.run(progress)
                     break
             except RuntimeError as error:
-                if "Failed to allocate" not in str(error) or worlds <= few:
-                    raise
+                text = str(error)
+                has_no_memory = "Failed to allocate" in text or "out of memory" in text
+                if not has_no_memory or worlds <= few:
+                    raise DeviceError(f"device {self._device} failed: {one_line(error)}") from error
                 worlds //= 2
         self._rows = max(self._rows, int(batch.counts.rows.numpy()[0]))
         contacts = float(batch.counts.contacts.numpy()[0]) / worlds
         self._contacts = max(self._contacts, contacts)
         batch.write_ends(ends, rows)
+
+    def pads(self, mass: Array) -> Array:
+        """Contact of the pads (N, 2, 3) with targets of masses (N,), see
+        `MujocoWorld.pad_contacts`."""
+        masses, rows = np.unique(mass, return_inverse=True)
+        contacts = [
+            self._world.pad_contacts(self._mobility * self._target_mass / m, self._fingers_mobility)
+            for m in masses.tolist()
+        ]
+        return np.array(contacts).reshape(-1, 2, 3)[rows]
 
     def model_with(self, worlds: int) -> tuple[mujoco.MjModel, mujoco_warp.Model]:
         """The model on the CPU and on the device."""
@@ -261,17 +279,15 @@ class _Batch:
     def run(self, progress: Callable[[], None] | None) -> None:
         """Executes the trials. The first check also compiles the kernels."""
         self._begin_trials()
-        with fixed_order(self._data):
+        with fixed_order(self._data):  # It also keeps the arrays that the graph uses.
             self._advance()
             with wp.ScopedCapture() as capture:
                 self._advance()
-        done = 0
-        while done < self._size:
-            for _ in range(CHECKS_PER_LOOK):
-                wp.capture_launch(capture.graph)
-            done = int(self.counts.done.numpy()[0])
-            if progress is not None:
-                progress()
+            while int(self.counts.done.numpy()[0]) < self._size:
+                for _ in range(CHECKS_PER_LOOK):
+                    wp.capture_launch(capture.graph)
+                if progress is not None:
+                    progress()
 
     def write_ends(self, ends: TrialEnds, rows: Indices) -> None:
         """Writes how the trials ended into rows of all ends."""
@@ -334,8 +350,9 @@ def _constants(world: MujocoWorld, instance: str, X_WO: Array, *, approaches: bo
     timeout = max(settings.close_timeout, 2.0 * hand.closing_time)
     c.step, c.poll, c.hold_time = step, settings.poll, settings.hold_time
     c.steps_per_check = max(1, round(settings.poll / step))
-    c.close_timeout = int(np.ceil(timeout / settings.poll - 1e-9))
-    c.settled_checks = int(np.ceil(settings.settled_time / settings.poll - 1e-6))
+    check_time = c.steps_per_check * step
+    c.close_timeout = int(np.ceil(timeout / check_time - 1e-9))
+    c.settled_checks = int(np.ceil(settings.settled_time / check_time - 1e-6))
     c.hold_checks = max(1, round(settings.hold_time / settings.poll))
     c.steady_checks = settings.steady_polls
     c.settled_speed = settings.settled_speed

@@ -124,9 +124,11 @@ def read_contacts(
         state.outside[w] = 1
     if bodies.standing[a] == 1 or bodies.standing[b] == 1:
         state.other[w] = 1
-    if hand_a and bodies.fixed[b] == 1:
+    if (hand_a and b == c.table) or (hand_b and a == c.table):
+        state.on_table[w] = 1
+    elif hand_a and bodies.fixed[b] == 1:
         wp.atomic_min(state.blocker, w, b)
-    if hand_b and bodies.fixed[a] == 1:
+    elif hand_b and bodies.fixed[a] == 1:
         wp.atomic_min(state.blocker, w, a)
     finger = finger_of(c, a, b)
     if finger < 0:
@@ -207,8 +209,8 @@ def find(c: Constants, trials: Trials, state: WorldStates, physics: Physics, w: 
         found.path = found.path + trials.ways[found.trial, 2][3]
     found.blocker = state.blocker[w]
     lowers = found.direction[2] < -1.0e-6 and state.phase[w] >= LIFT
-    if found.blocker == c.table and not lowers:
-        found.blocker = NO_BODY
+    if state.on_table[w] == 1 and lowers:
+        found.blocker = wp.min(found.blocker, c.table)
     return found
 
 
@@ -502,4 +504,5 @@ def clear_check(state: WorldStates, w: int):
     state.other[w] = 0
     state.hand_touches[w] = 0
     state.blocker[w] = NO_BODY
+    state.on_table[w] = 0
     state.others_step[w] = 0.0

@@ -11,7 +11,6 @@ import numpy as np
 from burg_drake.core import Array, Indices, inverse
 from burg_drake.simulation.hand_carrier import check_count
 from burg_drake.simulation.mujoco_trial import MujocoTrial
-from burg_drake.simulation.mujoco_world import MujocoWorld
 
 
 class End(IntEnum):
@@ -122,16 +121,16 @@ class Loads:
 
 
 def trial_starts(
-    trial: MujocoTrial, world: MujocoWorld, instance: str, X_WG: Array, loads: Loads
+    trial: MujocoTrial, instance: str, X_WG: Array, loads: Loads, pads: Array
 ) -> TrialStarts:
     """Starts of trials.
 
     Args:
         trial: executes such trials one by one.
-        world: its world in which only the target can move.
         instance: the target.
         X_WG: (N, 4, 4) grasps in the world at which the open hand is clear.
         loads: what differs between them.
+        pads: (N, 2, 3) see `MujocoWorld.pad_contacts`.
 
     Raises:
         InvalidInputError: the hand would not move.
@@ -161,18 +160,9 @@ def trial_starts(
         fingers=np.array([[f.position(c) for f in hand.fingers] for c in closed.tolist()]),
         friction=loads.friction,
         mass=loads.mass,
-        pads=_pads(world, instance, loads.mass),
-        early=np.full(len(X_WG), not world.engine.whole_trial),
+        pads=pads,
+        early=np.full(len(X_WG), not trial.engine.whole_trial),
         ways=ways,
         checks=np.array(counts)[at],
         time=times[at[:, 1]] + times[at[:, 2]],
     )
-
-
-def _pads(world: MujocoWorld, instance: str, mass: Array) -> Array:
-    """Contact of the pads (N, 2, 3) with targets of these masses."""
-    target = world.index.objects[instance]
-    own_mass, mobility = world.model.body_mass[target], world.model.body_invweight0[target, 0]
-    masses, rows = np.unique(mass, return_inverse=True)
-    contacts = [world.pad_contacts(float(mobility * own_mass / m)) for m in masses]
-    return np.array(contacts)[rows]

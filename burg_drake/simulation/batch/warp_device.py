@@ -63,6 +63,11 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
             "engine mujoco-gpu needs an NVIDIA card, and there is none here; use engine mujoco, or"
             " give device cpu to try it without a card"
         ).about("device")
+    if cards and not wp.is_conditional_graph_supported():
+        raise InvalidInputError(
+            "engine mujoco-gpu needs a driver for CUDA 12.4 or later; update that of NVIDIA, or use"
+            " engine mujoco"
+        ).about("engine")
     if name is not None and name not in known:
         raise InvalidInputError(
             f"there is no device {name!r} here; there is {list_names(list(known))}"
