@@ -208,6 +208,7 @@ def test_a_shelf_in_the_way_ends_the_trial(make_scene, height: float) -> None:
     assert_alike(result, batch.single.run("box", CENTRE))
 
 
+@pytest.mark.thorough
 def test_a_hand_that_goes_down_is_blocked_by_the_table(make_scene) -> None:
     motion = GraspMotion(lift_height=0.15, lift_direction=(0.0, -1.0, -0.02))
     batch = batch_of(make_scene(("bar", 0.3, 0.2, 90.0)), motion=motion)
@@ -261,6 +262,7 @@ def test_what_lies_on_the_target_goes_up_with_it(crowd: BatchTrial) -> None:
     assert result.margins.others_moved == pytest.approx(single.margins.others_moved, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_what_the_hand_touches_on_its_way_in_is_executed_on_the_cpu(make_scene) -> None:
     """A finger meets a rail that it is clear of at both ends of the way."""
     level = grasp_from_axes((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.04))
