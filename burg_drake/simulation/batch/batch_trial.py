@@ -57,7 +57,7 @@ WORLDS_ON_THE_CPU = 8
 """More are not faster there."""
 TRIALS_PER_WORLD = 3
 """Trials of a batch: worlds whose trial is done begin another, but wait at the end of a batch."""
-OUTCOMES = {
+LOST_OUTCOMES = {
     End.SLIPPED: Outcome.SLIPPED,
     End.DROPPED: Outcome.DROPPED,
     End.ONE_FINGER: Outcome.ONE_FINGER,
@@ -377,7 +377,7 @@ class _Batch:
         moved = still | dict(zip(others, ends.others_moved[k].tolist(), strict=True))
         turned = still | dict(zip(others, ends.others_turned[k].tolist(), strict=True))
         toppled = [n for n, over in zip(others, ends.others_toppled[k], strict=True) if over]
-        outcome = OUTCOMES.get(end)
+        outcome = LOST_OUTCOMES.get(end)
         if outcome is None:
             outcome = Outcome.LIFTED
             if slip > settings.slip_limit or tilt > settings.tilt_limit:

@@ -8,7 +8,7 @@ from typing import Any
 import warp as wp
 from mujoco_warp import Data, Model
 
-IDLE = 4
+IDLE_PHASE = 4
 """Phase of a world without a trial; see `trial_kernels`."""
 NO_BODY = 1 << 30
 """Larger than all numbers of bodies and checks."""

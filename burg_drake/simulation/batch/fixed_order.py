@@ -20,13 +20,14 @@ from mujoco_warp import Data
 from mujoco_warp._src import constraint, solver
 from mujoco_warp._src.types import ConstraintState
 
-ROWS = 3
+from burg_drake.simulation.batch.device_arrays import PairFriction
+
+ROWS_PER_CONTACT = 3
 """Constraint rows of a contact."""
-CONE = int(ConstraintState.CONE)
+SLIDING_STATE = int(ConstraintState.CONE)
 """State of a contact that slides."""
-SMALLEST = 1e-15
+MIN_DIVISOR = 1e-15
 """Smallest divisor, as in MuJoCo."""
-CoefficientsOfContact = wp.types.vector(length=5, dtype=float)
 
 
 @contextmanager
@@ -65,7 +66,7 @@ class _ContactRows:
     def __init__(self, data: Data) -> None:
         self._data = data
         self._count = wp.zeros(data.nworld, dtype=int)
-        self._keys = wp.zeros((data.nworld, data.njmax // ROWS), dtype=wp.int64)
+        self._keys = wp.zeros((data.nworld, data.njmax // ROWS_PER_CONTACT), dtype=wp.int64)
 
     def __call__(self, *arguments: Any) -> Any:
         data, contact = self._data, self._data.contact
@@ -101,7 +102,7 @@ def key_of(geom: wp.vec2i, number: int):
 def _forget(room: int, count: wp.array(dtype=int), efc_address: wp.array2d(dtype=int)):
     w = wp.tid()
     count[w] = 0
-    efc_address[w * room, ROWS] = -1
+    efc_address[w * room, ROWS_PER_CONTACT] = -1
 
 
 @wp.kernel(enable_backward=False)
@@ -148,11 +149,11 @@ def _number_rows(
     for other in range(contacts):
         if keys[w, other] < key:
             rank += 1
-    efc_address[i, 0] = nefc[w] + ROWS * rank
+    efc_address[i, 0] = nefc[w] + ROWS_PER_CONTACT * rank
     if rank < room:
-        efc_address[w * room + rank, ROWS] = i
+        efc_address[w * room + rank, ROWS_PER_CONTACT] = i
     if rank == 0 and contacts < room:
-        efc_address[w * room + contacts, ROWS] = -1
+        efc_address[w * room + contacts, ROWS_PER_CONTACT] = -1
 
 
 @wp.kernel(enable_backward=False)
@@ -188,9 +189,9 @@ def _take_rows(
     if i >= wp.min(nacon[0], dist.shape[0]) or not is_active(dist[i], margin[i], kind[i]):
         return
     w, first = worldid[i], efc_address[i, 0]
-    wp.atomic_add(nefc, w, ROWS)
-    for k in range(ROWS):
-        if first + ROWS > njmax:
+    wp.atomic_add(nefc, w, ROWS_PER_CONTACT)
+    for k in range(ROWS_PER_CONTACT):
+        if first + ROWS_PER_CONTACT > njmax:
             efc_address[i, k] = -1
         else:
             efc_address[i, k] = first + k
@@ -247,7 +248,7 @@ def cone_curvature(
     if weight == 0.0:
         return float(0.0)
     u_1, u_2 = friction * jar[1], friction * jar[2]
-    T = wp.max(wp.sqrt(u_1 * u_1 + u_2 * u_2), SMALLEST)
+    T = wp.max(wp.sqrt(u_1 * u_1 + u_2 * u_2), MIN_DIVISOR)
     n_1, n_2 = mu * column_1[0], mu * column_2[0]
     a_1, a_2 = friction * column_1[1], friction * column_2[1]
     b_1, b_2 = friction * column_1[2], friction * column_2[2]
@@ -264,7 +265,7 @@ def _add_cones(
     dof_tri_col: wp.array(dtype=int),
     dist: wp.array(dtype=float),
     margin: wp.array(dtype=float),
-    friction: wp.array(dtype=CoefficientsOfContact),
+    friction: wp.array(dtype=PairFriction),
     condim: wp.array(dtype=int),
     efc_address: wp.array2d(dtype=int),
     worldid: wp.array(dtype=int),
@@ -290,14 +291,14 @@ def _add_cones(
         if not done[w]:
             total, k = float(0.0), int(0)
             while k < room:
-                contact = efc_address[w * room + k, ROWS]
+                contact = efc_address[w * room + k, ROWS_PER_CONTACT]
                 k += 1
                 if contact < 0:
                     k = room
                 else:
                     row = efc_address[contact, 0]
                     if row >= 0:
-                        if state[w, row] == CONE:
+                        if state[w, row] == SLIDING_STATE:
                             total += cone_curvature(
                                 friction[contact][0],
                                 friction[contact][0] * impratio_invsqrt[0],

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from burg_drake.core import Array, DeviceError, Indices, one_line
 from burg_drake.simulation.batch import start_kernels, trial_kernels
 from burg_drake.simulation.batch.device_arrays import (
-    IDLE,
+    IDLE_PHASE,
     PER_WORLD,
     Bodies,
     Constants,
@@ -27,13 +27,13 @@ from burg_drake.simulation.batch.device_arrays import (
     element_types,
     physics_of,
 )
-from burg_drake.simulation.batch.fixed_order import ROWS, fixed_order
+from burg_drake.simulation.batch.fixed_order import ROWS_PER_CONTACT, fixed_order
 from burg_drake.simulation.batch.trial_starts import End, TrialEnds, TrialStarts
 from burg_drake.simulation.mujoco_world import MujocoWorld
 
 CHECKS_PER_LOOK = 10
 """Contact checks between two looks at how many trials are done."""
-OVERFLOWS = (
+FATAL_OVERFLOWS = (
     OverflowType.NEFC
     | OverflowType.BROADPHASE
     | OverflowType.NARROWPHASE
@@ -42,7 +42,7 @@ OVERFLOWS = (
 )
 """Overflows that make a world wrong. The limits of the solver's iterations are not among them: the
 engine on the CPU has them, too."""
-TOLERANCE = 1e-14
+SOLVER_TOLERANCE = 1e-14
 """As in the model, see `add_trial_options`; MuJoCo Warp would raise it to 1e-6."""
 
 
@@ -71,7 +71,9 @@ class Room:
         enough = 64
         while enough < reserve * rows:
             enough *= 2
-        return cls(enough, max(int(np.ceil(reserve * contacts)) + 16, enough // ROWS + 1))
+        return cls(
+            enough, max(int(np.ceil(reserve * contacts)) + 16, enough // ROWS_PER_CONTACT + 1)
+        )
 
 
 class ParallelWorlds:
@@ -188,7 +190,7 @@ class ParallelWorlds:
     def model_with(self, worlds: int) -> tuple[mujoco.MjModel, mujoco_warp.Model]:
         """The model on the CPU and on the device."""
         model = mujoco_warp.put_model(self._model, batch_sizes=dict.fromkeys(PER_WORLD, worlds))
-        model.opt.tolerance.fill_(TOLERANCE)
+        model.opt.tolerance.fill_(SOLVER_TOLERANCE)
         model.opt.warn_overflow = 0
         return self._model, model
 
@@ -263,7 +265,7 @@ class _Batch:
 
     def __init__(self, worlds: ParallelWorlds, starts: TrialStarts, count: int, room: Room) -> None:
         model, self._model = worlds.model_with(count)
-        contacts = max(room.contacts, room.rows // ROWS + 1)
+        contacts = max(room.contacts, room.rows // ROWS_PER_CONTACT + 1)
         self._data = mujoco_warp.make_data(model, nworld=count, nconmax=contacts, njmax=room.rows)
         self._physics = physics_of(self._model, self._data)
         self._constants, self._bodies, self._masses = worlds.shared
@@ -361,7 +363,7 @@ def _constants(world: MujocoWorld, instance: str, X_WO: Array, *, approaches: bo
     c.slip_limit, c.tilt_limit = settings.slip_limit, settings.tilt_limit
     c.carried_mass = world.carried_mass
     c.early, c.approaches = int(not world.engine.whole_trial), int(approaches)
-    c.overflows = int(OVERFLOWS)
+    c.overflows = int(FATAL_OVERFLOWS)
     c.target = index.objects[instance]
     c.hand, (c.finger_1, c.finger_2) = index.hand, index.fingers
     c.carrier, c.table = index.carrier, index.table
@@ -430,5 +432,5 @@ def _state(worlds: int, steady_checks: int, spheres: int, others: int) -> WorldS
     for name, kind in element_types(WorldStates).items():
         shape = (worlds, columns[name]) if name in columns else (worlds,)
         setattr(state, name, wp.zeros(shape, dtype=kind))
-    state.phase.fill_(IDLE)
+    state.phase.fill_(IDLE_PHASE)
     return state

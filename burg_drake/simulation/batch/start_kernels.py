@@ -6,7 +6,7 @@ Annotations are not postponed, as Warp reads them.
 import warp as wp
 
 from burg_drake.simulation.batch.device_arrays import (
-    IDLE,
+    IDLE_PHASE,
     NO_BODY,
     Bodies,
     Constants,
@@ -110,7 +110,7 @@ def begin_trials(
 ):
     """Gives the next trial to each world without one."""
     w = wp.tid()
-    if state.phase[w] != IDLE or counts.begun[0] >= trials.end.shape[0]:
+    if state.phase[w] != IDLE_PHASE or counts.begun[0] >= trials.end.shape[0]:
         return
     trial = wp.atomic_add(counts.begun, 0, 1)
     if trial >= trials.end.shape[0]:

@@ -11,7 +11,7 @@ Annotations are not postponed, as Warp reads them.
 import warp as wp
 
 from burg_drake.simulation.batch.device_arrays import (
-    IDLE,
+    IDLE_PHASE,
     NO_BODY,
     Bodies,
     Check,
@@ -22,13 +22,13 @@ from burg_drake.simulation.batch.device_arrays import (
     WorldStates,
 )
 from burg_drake.simulation.batch.trial_starts import End
+from burg_drake.simulation.object_motions import SLIP_LEVER
+from burg_drake.simulation.trial_execution import MIN_LIFT_SHARE
 
 APPROACH, CLOSE, LIFT, HOLD = 0, 1, 2, 3
-"""Phases of a world; `IDLE` is the last."""
+"""Phases of a world; `IDLE_PHASE` is the last."""
 FORCE_UNIT = 1e-6
 """Newton. Unit of summed forces."""
-SLIP_LEVER = 0.01
-"""Metres; see `object_motions`."""
 COS_TILTED, MIN_HEIGHT_CHANGE, MIN_HEIGHT_SHARE = 0.70710678, 0.003, 0.1
 """See `MotionTracker`; the second one in metres."""
 
@@ -62,7 +62,7 @@ def command_lift(c: Constants, trials: Trials, state: WorldStates, physics: Phys
     w = wp.tid()
     phase = state.phase[w]
     position, speed, force = float(0.0), float(0.0), float(0.0)
-    if phase != IDLE:
+    if phase != IDLE_PHASE:
         trial, segment = state.trial[w], state.segment[w]
         length = trials.ways[trial, segment][3]
         if phase == APPROACH or phase == LIFT:
@@ -114,7 +114,7 @@ def read_contacts(
     if i >= wp.min(physics.nacon[0], room):
         return
     w = worldid[i]
-    if dist[i] >= 0.0 or state.phase[w] == IDLE:
+    if dist[i] >= 0.0 or state.phase[w] == IDLE_PHASE:
         return
     a, b = bodies.of_geom[geom[i][0]], bodies.of_geom[geom[i][1]]
     hand_a, hand_b = is_hand(c, a), is_hand(c, b)
@@ -154,7 +154,7 @@ def read_contacts(
 def track_others(c: Constants, bodies: Bodies, state: WorldStates, physics: Physics):
     """Tracks the other bodies that can move, as `MotionTracker` does."""
     w, k = wp.tid()
-    if state.phase[w] == IDLE:
+    if state.phase[w] == IDLE_PHASE:
         return
     body = bodies.others[k]
     p, q = physics.xpos[w, body], to_xyzw(physics.xquat[w, body])
@@ -359,7 +359,7 @@ def is_decided(c: Constants, trials: Trials, state: WorldStates, w: int, k: Chec
         and k.both
         and k.is_steady
         and state.free_checks[w] >= c.steady_checks
-        and k.followed + k.length - k.travelled >= 0.5 * k.path
+        and k.followed + k.length - k.travelled >= MIN_LIFT_SHARE * k.path
         and is_stable(c, k, trials.time[k.trial] + c.hold_time)
     )
 
@@ -383,7 +383,7 @@ def judge_lift(
     if trials.early[k.trial] == 1 and is_decided(c, trials, state, w, k):
         return int(End.HELD_IF_FREE)
     if state.in_phase[w] == checks:
-        if not k.both or k.followed < 0.5 * k.path:
+        if not k.both or k.followed < MIN_LIFT_SHARE * k.path:
             return int(End.SLIPPED)
         state.phase[w] = HOLD
         state.in_phase[w] = 0
@@ -462,7 +462,7 @@ def judge(
     """Evaluates the check of each world, and goes on to its next phase or ends its trial."""
     w = wp.tid()
     phase = state.phase[w]
-    if phase == IDLE:
+    if phase == IDLE_PHASE:
         return
     wp.atomic_max(counts.rows, 0, physics.nefc[w])
     wp.atomic_max(counts.contacts, 0, wp.max(physics.nacon[0], physics.ncollision[0]))
@@ -488,7 +488,7 @@ def judge(
         end = judge_hold(c, state, w, k)
     if end != int(End.RUNNING):
         end_trial(c, bodies, trials, state, physics, w, k, end)
-        state.phase[w] = IDLE
+        state.phase[w] = IDLE_PHASE
         wp.atomic_add(counts.done, 0, 1)
     clear_check(state, w)
 
