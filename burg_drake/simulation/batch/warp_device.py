@@ -55,7 +55,8 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
 
     wp.config.quiet = True
     wp.config.log_level = wp.LOG_ERROR
-    wp.init()
+    with _without_stderr():  # There Warp says that a machine has no card.
+        wp.init()
     known = {device.alias: device for device in wp.get_devices()}
     cards = [device for device in known.values() if device.is_cuda]
     if name is None and not cards:
@@ -73,6 +74,19 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
             f"there is no device {name!r} here; there is {list_names(list(known))}"
         ).about("device")
     return cards if name is None else [known[name]]
+
+
+@contextmanager
+def _without_stderr() -> Iterator[None]:
+    """Discards what libraries write to standard error meanwhile."""
+    kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(null)
 
 
 @contextmanager
