@@ -27,6 +27,7 @@ from burg_drake.grasping import Clearance, HandClearance
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.simulation.hand_carrier import HandLiftClearance, LiftCarrier, LiftPath
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.simulation.shaking import ShakeCarrier, ShakeExecution, require_alone
 from burg_drake.simulation.trial_execution import Execution, OtherTouched, SteppedWorld
 from burg_drake.simulation.trial_result import (
     GripLoad,
@@ -190,7 +191,9 @@ class GraspTrial(ABC, Generic[W]):
             margins = replace(found.margins, clearance=screen.clearance)
             load = self.grip_load(instance, X_WG, friction=friction, mass=mass)
             since_grip = replace(margins, end_time=margins.end_time - found.grip_start)
-            trust = confidence(self.engine, found.outcome, since_grip, load)
+            trust = None
+            if self.settings.shake is None:
+                trust = confidence(self.engine, found.outcome, since_grip, load)
             return replace(found, margins=margins, confidence=trust)
         except self.failures as error:
             world.invalidate()
@@ -325,6 +328,8 @@ class HandAloneTrial(GraspTrial[W]):
         motion: GraspMotion | None,
         lock: bool,
     ) -> None:
+        if settings.shake is not None:
+            require_alone(scene, station)
         self._plain_diagram = build_station_diagram(scene, station, robot="hand")
         clearance = HandClearance(self._plain_diagram)
         super().__init__(
@@ -526,5 +531,7 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         world.command("lift", np.zeros(2))
         world.simulator.Initialize()
         lift_clearance = partial(self.lift_clearance, instance)
+        if self.settings.shake is not None:
+            return ShakeExecution(world, target, moving, ShakeCarrier(world, target))
         carrier = LiftCarrier(world, paths, lift_clearance, approach, target)
         return Execution(world, target, moving, carrier)

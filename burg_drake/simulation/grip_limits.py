@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import UniformGravityFieldElement
 
 from burg_drake.core import Array, Outcome, UnknownNameError, inverse, suggest_names
@@ -132,8 +130,9 @@ class Grip:
         try:
             for check in range(checks):
                 for k in range(check * steps_per_check, (check + 1) * steps_per_check):
-                    self._apply(self.weight * (R_WG @ load((k + 0.5) * self._step)))
-                    self._advance_by(1)
+                    f_W = self.weight * (R_WG @ load((k + 0.5) * self._step))
+                    self._world.push(self._target.index(), f_W, np.zeros(3))
+                    self._world.advance(1)
                 before, X_GO = X_GO, self._current_X_GO()
                 if not (self._is_held() and motion_in_hand(self._X_GO, X_GO)[0] <= slide):
                     return False
@@ -144,14 +143,6 @@ class Grip:
             return True
         finally:
             self._forces_port.FixValue(self._world.context, [])
-
-    def _apply(self, f_W: Array) -> None:
-        """Applies a force (3,) to the target's centre of mass [N]."""
-        force = ExternallyAppliedSpatialForce()
-        force.body_index = self._target.index()
-        force.p_BoBq_B = self._target.default_com()
-        force.F_Bq_W = SpatialForce(np.zeros(3), f_W)
-        self._forces_port.FixValue(self._world.context, [force])
 
     def _is_held(self) -> bool:
         contacts = self._world.read_contacts()
@@ -184,12 +175,7 @@ class Grip:
                 return
 
     def _advance(self) -> None:
-        self._advance_by(max(1, round(self._world.settings.poll / self._step)))
-
-    def _advance_by(self, steps: int) -> None:
-        """Advances by whole time steps, with the rounding of Drake's own steps."""
-        done = round(self._world.time / self._step)
-        self._world.simulator.AdvanceTo((done + steps) * self._step)
+        self._world.advance(max(1, round(self._world.settings.poll / self._step)))
 
     def _current_X_GO(self) -> Array:
         X_GO: Array = inverse(self._world.X_WG()) @ self._world.X_WB(self._target.index())

@@ -23,6 +23,7 @@ from burg_drake.simulation.grasp_trial import HandAloneTrial, HandTrial
 from burg_drake.simulation.hand_carrier import FloatingCarrier, check_count, copy_object_poses
 from burg_drake.simulation.mujoco_world import MujocoWorld, load_mujoco
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.simulation.shaking import ShakeCarrier, ShakeExecution
 from burg_drake.simulation.trial_execution import Execution
 from burg_drake.simulation.trial_result import TrialResult
 from burg_drake.simulation.trial_world import check_overrides
@@ -243,9 +244,12 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
             closed = self.closed_before_contact(instance, X_WG) if approach is None else None
             direction_W = (approach or paths[0]).direction_W
             world.prepare(instance, X_WF, closed, direction_W, friction=friction, mass=mass)
+            moving = set(world.free.values())
+            if self.settings.shake is not None:
+                return ShakeExecution(world, target, moving, ShakeCarrier(world, target))
             lift_clearance = partial(self.lift_clearance, instance)
             carrier = MujocoCarrier(world, paths, lift_clearance, approach, target)
-            return Execution(world, target, set(world.free.values()), carrier)
+            return Execution(world, target, moving, carrier)
 
         return self.execute(instance, X_WG, begin, friction=friction, mass=mass)
 

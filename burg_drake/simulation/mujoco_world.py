@@ -20,6 +20,7 @@ from burg_drake.core import (
     InvalidInputError,
     MissingDependencyError,
     quaternion_from_rotation,
+    rotation_from_quaternion,
 )
 from burg_drake.export import (
     HAND_CARRIER_BODY,
@@ -36,6 +37,7 @@ from burg_drake.export import (
 from burg_drake.objects import hull_corners
 from burg_drake.scene import SceneLike, as_scene
 from burg_drake.simulation.contacts import BodyContact
+from burg_drake.simulation.object_motions import MovingBody
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_execution import OtherTouched
 from burg_drake.station import Engine, HandDescription, StationLike, as_station, is_on_table
@@ -337,6 +339,34 @@ class MujocoWorld:
     def advance(self, steps: int) -> None:
         """Advances the simulation with the current commands."""
         self._mj.mj_step(self.model, self.data, nstep=steps)
+
+    def moving_body(self, body: BodyIndex) -> MovingBody:
+        """State of a free body."""
+        # From positions and speeds, as poses of bodies are those before the last step.
+        model, data, k = self.model, self.data, int(body)
+        at, dof = model.jnt_qposadr[model.body_jntadr[k]], model.body_dofadr[k]
+        R_WB = rotation_from_quaternion(data.qpos[at + 3 : at + 7])
+        p_BCm_W = R_WB @ model.body_ipos[k]
+        axes = R_WB @ rotation_from_quaternion(model.body_iquat[k])
+        w_W = R_WB @ data.qvel[dof + 3 : dof + 6]
+        return MovingBody(
+            float(model.body_mass[k]),
+            (axes * model.body_inertia[k]) @ axes.T,
+            data.qpos[at : at + 3] + p_BCm_W,
+            data.qvel[dof : dof + 3] + np.cross(w_W, p_BCm_W),
+            w_W,
+        )
+
+    def push(self, body: BodyIndex, force_W: Array, torque_W: Array) -> None:
+        """Applies a force (3,) at the centre of mass of a body [N] and a torque (3,) [N m], and
+        none to others, until the next call."""
+        self.data.xfrc_applied[:] = 0.0
+        self.data.xfrc_applied[int(body)] = *force_W, *torque_W
+
+    @property
+    def gravity(self) -> Array:
+        """(3,) gravity in the world [m/s^2]."""
+        return np.array(self.model.opt.gravity)
 
     @property
     def time(self) -> float:

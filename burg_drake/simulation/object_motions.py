@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -27,6 +28,25 @@ class PlacedBodies(Protocol):
     def corners(self, body: BodyIndex) -> Array:
         """(N, 3) corners of a body's convex hull in its frame [m]."""
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class MovingBody:
+    """A rigid body in motion, in the world frame.
+
+    Attributes:
+        mass: [kg].
+        I_W: (3, 3) rotational inertia about the centre of mass [kg m^2].
+        p_W: (3,) centre of mass [m].
+        v_W: (3,) its velocity [m/s].
+        w_W: (3,) angular velocity [rad/s].
+    """
+
+    mass: float
+    I_W: Array
+    p_W: Array
+    v_W: Array
+    w_W: Array
 
 
 class MotionTracker:

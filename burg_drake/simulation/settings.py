@@ -17,6 +17,43 @@ REFERENCE_LIFT_LENGTH = 0.30
 
 
 @dataclass(frozen=True, kw_only=True)
+class ShakeSettings:
+    """Shaking of the hand with a weightless target, in place of the lift.
+
+    The hand closes, goes to and fro along its approach, and turns to and fro about its closing
+    axis: the order and the axes of Eppner et al., "ACRONYM" (2021). In each period it goes to one
+    side and back, `s (1 - cos(2 pi f t)) / 2` for a stroke s and frequency f, and to the other side
+    in the next. By default the load of each part is about that of gravity.
+
+    Attributes:
+        shake_acceleration: largest acceleration along the approach [m/s^2].
+        turn_acceleration: largest angular acceleration about the closing axis [rad/s^2].
+        shake_frequency: periods a second of both [Hz].
+        shake_periods: number of periods of each.
+    """
+
+    RANGES: ClassVar[Ranges] = {
+        "shake_acceleration": (0.0, 1e3),
+        "turn_acceleration": (0.0, 1e5),
+        "shake_frequency": (0.1, 100.0),
+        "shake_periods": (1, 100),
+    }
+
+    shake_acceleration: float = 9.81
+    turn_acceleration: float = 100.0
+    shake_frequency: float = 3.0
+    shake_periods: int = 2
+
+    def __post_init__(self) -> None:
+        require_ranges(self, "shaking")
+
+    @property
+    def duration(self) -> float:
+        """Duration of both parts [s]."""
+        return 2.0 * self.shake_periods / self.shake_frequency
+
+
+@dataclass(frozen=True, kw_only=True)
 class TrialSettings:
     """Phases of a trial.
 
@@ -40,6 +77,7 @@ class TrialSettings:
         slip_limit: likewise for a target that has slid farther than this [m]; infinite for no
             limit.
         approach: whether the hand alone begins at the pregrasp, and not at the grasp.
+        shake: shaking in place of the lift, of a target alone and without gravity; None for a lift.
     """
 
     RANGES: ClassVar[Ranges] = {
@@ -72,6 +110,7 @@ class TrialSettings:
     tilt_limit: float = math.radians(30)
     slip_limit: float = 0.02
     approach: bool = False
+    shake: ShakeSettings | None = None
 
     def __post_init__(self) -> None:
         require_ranges(self, "a trial")

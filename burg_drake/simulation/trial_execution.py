@@ -22,7 +22,12 @@ from burg_drake.simulation.contacts import (
     is_touched_from_outside,
     touched_bodies,
 )
-from burg_drake.simulation.object_motions import GripMotion, MotionTracker, PlacedBodies
+from burg_drake.simulation.object_motions import (
+    GripMotion,
+    MotionTracker,
+    MovingBody,
+    PlacedBodies,
+)
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_result import TrialResult
 from burg_drake.station import Engine, Hand
@@ -161,8 +166,26 @@ class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
         """Time since the start of the trial [s]."""
         ...
 
+    @property
+    def gravity(self) -> Array:
+        """(3,) gravity in the world [m/s^2]."""
+        ...
+
     def finger_speed(self) -> float:
         """Speed of the faster finger [m/s]."""
+        ...
+
+    def moving_body(self, body: BodyIndex) -> MovingBody:
+        """State of a free body."""
+        ...
+
+    def push(self, body: BodyIndex, force_W: Array, torque_W: Array) -> None:
+        """Applies a force (3,) at the centre of mass of a body [N] and a torque (3,) [N m], and
+        none to others, until the next call."""
+        ...
+
+    def advance(self, steps: int) -> None:
+        """Advances the simulation by time steps, with the current commands."""
         ...
 
     def X_WG(self) -> Array:

@@ -9,7 +9,8 @@ from collections.abc import Iterable
 
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet
-from pydrake.multibody.plant import ContactResults
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ContactResults, ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiscreteValues
@@ -22,6 +23,7 @@ from burg_drake.simulation.contacts import (
     Neighbours,
     assign_friction,
 )
+from burg_drake.simulation.object_motions import MovingBody
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_execution import OtherTouched
 from burg_drake.station import (
@@ -87,6 +89,11 @@ class TrialWorld:
         """Time since the start of the trial [s]."""
         return float(self.context.get_time())
 
+    @property
+    def gravity(self) -> Array:
+        """(3,) gravity in the world [m/s^2]."""
+        return np.asarray(self.diagram.plant.gravity_field().gravity_vector())
+
     def robot_positions(self, model: str) -> Array | None:
         """Positions of one of `ROBOT_MODELS`; None if missing."""
         plant = self.diagram.plant
@@ -115,6 +122,36 @@ class TrialWorld:
         found = self.diagram.plant.get_body(body)
         X_WB = self.diagram.plant.EvalBodyPoseInWorld(self.plant_context, found)
         return np.asarray(X_WB.multiply(found.default_com()))
+
+    def moving_body(self, body: BodyIndex) -> MovingBody:
+        """State of a free body."""
+        context, found = self.plant_context, self.diagram.plant.get_body(body)
+        X_WB = self.diagram.plant.EvalBodyPoseInWorld(context, found)
+        M_B, R_WB = found.CalcSpatialInertiaInBodyFrame(context), X_WB.rotation().matrix()
+        p_BCm = M_B.get_com()
+        velocity = found.EvalSpatialVelocityInWorld(context).Shift(R_WB @ p_BCm)
+        inertia = M_B.Shift(p_BCm).CalcRotationalInertia().CopyToFullMatrix3()
+        return MovingBody(
+            M_B.get_mass(),
+            R_WB @ inertia @ R_WB.T,
+            np.asarray(X_WB.multiply(p_BCm)),
+            np.asarray(velocity.translational()),
+            np.asarray(velocity.rotational()),
+        )
+
+    def push(self, body: BodyIndex, force_W: Array, torque_W: Array) -> None:
+        """Applies a force (3,) at the centre of mass of a body [N] and a torque (3,) [N m], and
+        none to others, until the next call."""
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = body
+        force.p_BoBq_B = self.diagram.plant.get_body(body).default_com()
+        force.F_Bq_W = SpatialForce(torque_W, force_W)
+        self.diagram.diagram.GetInputPort("applied_forces").FixValue(self.context, [force])
+
+    def advance(self, steps: int) -> None:
+        """Advances the simulation by time steps, with the rounding of Drake's own steps."""
+        step = self.engine.time_step
+        self.simulator.AdvanceTo((round(self.time / step) + steps) * step)
 
     def read_contacts(self) -> list[BodyContact]:
         """Current contacts.

@@ -395,7 +395,7 @@ class _Batch:
             patch_area=float((ends.spheres[k] * world.sphere_areas).min())
             if has_gripped
             else np.nan,
-            lift=float(ends.lift[k]) + left,
+            lift=np.nan if settings.shake else float(ends.lift[k]) + left,
             others_moved=max(moved.values(), default=0.0),
             others_turned=max(turned.values(), default=0.0),
             end_time=time,
@@ -415,7 +415,9 @@ class _Batch:
             outcome=outcome,
             grip_start=grip_start,
             margins=margins,
-            confidence=confidence(trial.engine, outcome, since_grip, load),
+            confidence=None
+            if settings.shake
+            else confidence(trial.engine, outcome, since_grip, load),
             blocker=world.body_names[BodyIndex(int(ends.blocker[k]))]
             if outcome is Outcome.BLOCKED
             else "",

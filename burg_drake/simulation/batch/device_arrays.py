@@ -28,15 +28,18 @@ class Constants:
         carried_mass: of carrier and hand, with the inertia of the drive [kg].
         early: 1 if trials may end early.
         approaches: 1 if trials begin at the pregrasp.
+        shakes: 1 if the hand is shaken in place of the lift.
+        shake_acceleration, turn_acceleration, shake_frequency, shake_periods: see `ShakeSettings`.
         overflows: bits of overflows that matter.
         target, hand, finger_1, finger_2, carrier, table: bodies.
         lift_joint, lift_qpos, lift_dof, lift_position_servo, lift_speed_servo: of the carrier.
         finger_qpos, finger_dof, finger_servo: of both fingers.
         closing_speed: of both fingers, signed [m/s].
-        target_dof: first degree of freedom of the target.
+        target_qpos, target_dof: first position and degree of freedom of the target.
         target_mass: mass in the library [kg].
-        gravity: (3,) [m/s^2].
+        gravity: (3,) that acts on free bodies [m/s^2].
         p_HG, q_HG: the grasp frame in the hand.
+        p_OCm, q_OI: centre of mass and principal axes of the target in its frame.
         p_WO, q_WO, center: the target at the start, and its centre of mass.
     """
 
@@ -56,6 +59,11 @@ class Constants:
     carried_mass: float
     early: int
     approaches: int
+    shakes: int
+    shake_acceleration: float
+    turn_acceleration: float
+    shake_frequency: float
+    shake_periods: float
     overflows: int
     target: int
     hand: int
@@ -72,11 +80,14 @@ class Constants:
     finger_dof: wp.vec2i
     finger_servo: wp.vec2i
     closing_speed: wp.vec2
+    target_qpos: int
     target_dof: int
     target_mass: float
     gravity: wp.vec3
     p_HG: wp.vec3
     q_HG: wp.quat
+    p_OCm: wp.vec3
+    q_OI: wp.quat
     p_WO: wp.vec3
     q_WO: wp.quat
     center: wp.vec3
@@ -131,6 +142,7 @@ class Trials:
         friction, mass: of the target.
         pads: stiffness, damping and impedance of the contact of each pad.
         early: 1 if the trial may end before the end of its lift.
+        turn: 1 if a shaken hand first turns about its closing axis, -1 if it turns the other way.
         ways: the approach, and one or two segments: direction in the world, and length.
         checks: number of checks of each; 0 if there is none.
         time: duration of the segments with the target [s].
@@ -159,6 +171,7 @@ class Trials:
     mass: wp.array(dtype=float)
     pads: wp.array2d(dtype=wp.vec3)
     early: wp.array(dtype=int)
+    turn: wp.array(dtype=int)
     ways: wp.array2d(dtype=wp.vec4)
     checks: wp.array2d(dtype=int)
     time: wp.array(dtype=float)

@@ -374,10 +374,18 @@ def _constants(world: MujocoWorld, instance: str, X_WO: Array, *, approaches: bo
     c.finger_servo = wp.vec2i(*index.finger_servos.tolist())
     c.closing_speed = wp.vec2(*world.closing_speeds.tolist())
     c.target_dof = int(model.body_dofadr[c.target])
+    c.target_qpos = int(model.jnt_qposadr[model.body_jntadr[c.target]])
     c.target_mass = float(model.body_mass[c.target])
     c.gravity = wp.vec3(*model.opt.gravity)
+    if settings.shake is not None:
+        c.shakes, c.gravity = 1, wp.vec3(0.0)
+        for name, value in vars(settings.shake).items():
+            setattr(c, name, float(value))
     X_HG = hand.X_HG.matrix()
     c.p_HG, c.q_HG = wp.vec3(*X_HG[:3, 3]), wp.quat(*_quaternions(X_HG[:3, :3]))
+    c.p_OCm = wp.vec3(*model.body_ipos[c.target])
+    w, x, y, z = model.body_iquat[c.target]
+    c.q_OI = wp.quat(x, y, z, w)
     c.p_WO, c.q_WO = wp.vec3(*X_WO[:3, 3]), wp.quat(*_quaternions(X_WO[:3, :3]))
     c.center = wp.vec3(*world.center(world.free[instance]))
     return c
@@ -400,6 +408,7 @@ def _trials(starts: TrialStarts, others: int) -> Trials:
     trials.mass = wp.array(starts.mass, dtype=float)
     trials.pads = wp.array(starts.pads, dtype=wp.vec3)
     trials.early = wp.array(starts.early, dtype=int)
+    trials.turn = wp.array(starts.turn, dtype=int)
     trials.ways = wp.array(starts.ways, dtype=wp.vec4)
     trials.checks = wp.array(starts.checks, dtype=int)
     trials.time = wp.array(starts.time, dtype=float)

@@ -56,6 +56,58 @@ def along(length: float, steps: int, step: int, time_step: float):
     return wp.vec2(length * gone, 4.0 * length * left / (float(steps) * time_step))
 
 
+@wp.func
+def stroke(periods: float, acceleration: float, frequency: float):
+    """Speed and acceleration of a stroke of `Shaking`."""
+    if wp.int32(wp.floor(periods)) % 2 == 1:
+        acceleration = -acceleration
+    phase = 2.0 * wp.pi * (periods - wp.floor(periods))
+    return acceleration * wp.vec2(wp.sin(phase) / (2.0 * wp.pi * frequency), wp.cos(phase))
+
+
+@wp.func
+def shake_target(c: Constants, trials: Trials, state: WorldStates, physics: Physics, w: int):
+    """Applies the forces of a shaken hand to the target for the next step, as `Shaking` does."""
+    # `command_lift` has counted the next step.
+    periods = (float(state.step[w]) - 0.5) * c.step * c.shake_frequency
+    along, about = wp.vec2(0.0, 0.0), wp.vec2(0.0, 0.0)
+    if periods < c.shake_periods:
+        along = stroke(periods, c.shake_acceleration, c.shake_frequency)
+    elif periods < 2.0 * c.shake_periods:
+        about = stroke(periods - c.shake_periods, c.turn_acceleration, c.shake_frequency)
+    q_WG = to_xyzw(physics.xquat[w, c.hand]) * c.q_HG
+    side = float(trials.turn[state.trial[w]])
+    axis = wp.quat_rotate(q_WG, wp.vec3(side, 0.0, 0.0))
+    omega, alpha = about[0] * axis, about[1] * axis
+    p, v = c.target_qpos, c.target_dof
+    q_WO = wp.normalize(
+        wp.quat(
+            physics.qpos[w, p + 4],
+            physics.qpos[w, p + 5],
+            physics.qpos[w, p + 6],
+            physics.qpos[w, p + 3],
+        )
+    )
+    p_WO = wp.vec3(physics.qpos[w, p], physics.qpos[w, p + 1], physics.qpos[w, p + 2])
+    v_WO = wp.vec3(physics.qvel[w, v], physics.qvel[w, v + 1], physics.qvel[w, v + 2])
+    w_O = wp.vec3(physics.qvel[w, v + 3], physics.qvel[w, v + 4], physics.qvel[w, v + 5])
+    w_W, p_OCm_W = wp.quat_rotate(q_WO, w_O), wp.quat_rotate(q_WO, c.p_OCm)
+    v_W = v_WO + wp.cross(w_W, p_OCm_W)
+    r = p_WO + p_OCm_W - state.p_WG[w]
+    principal = physics.body_inertia[w, c.target]
+    axes = wp.quat_to_matrix(q_WO * c.q_OI)
+    inertia = axes * wp.diag(principal) * wp.transpose(axes)
+    acceleration = along[1] * wp.quat_rotate(q_WG, wp.vec3(0.0, 0.0, 1.0)) + wp.cross(alpha, r)
+    acceleration += wp.cross(omega, wp.cross(omega, r)) + 2.0 * wp.cross(omega, v_W)
+    torque = inertia * alpha + wp.cross(omega, inertia * omega)
+    torque += wp.cross(w_W, inertia * omega) - inertia * wp.cross(w_W, omega)
+    torque += wp.cross(omega, inertia * w_W)
+    force = -trials.mass[state.trial[w]] * acceleration
+    physics.xfrc_applied[w, c.target] = wp.spatial_vector(
+        force[0], force[1], force[2], -torque[0], -torque[1], -torque[2]
+    )
+
+
 @wp.kernel(enable_backward=False)
 def command_lift(c: Constants, trials: Trials, state: WorldStates, physics: Physics):
     """Commands the carriers for the next step."""
@@ -74,6 +126,8 @@ def command_lift(c: Constants, trials: Trials, state: WorldStates, physics: Phys
             force = c.carried_mass * (after[1] - before[1]) / c.step
         elif phase == HOLD or segment == 0:
             position = length
+        if phase == LIFT and c.shakes == 1:
+            shake_target(c, trials, state, physics, w)
     physics.ctrl[w, c.lift_position_servo] = position
     physics.ctrl[w, c.lift_speed_servo] = speed
     physics.qfrc_applied[w, c.lift_dof] = force
@@ -392,6 +446,18 @@ def judge_lift(
 
 
 @wp.func
+def judge_shake(trials: Trials, state: WorldStates, w: int, k: Check):
+    """Goes on until the shaking is over."""
+    if not k.some:
+        return int(End.SLIPPED)
+    if state.in_phase[w] < trials.checks[k.trial, 1]:
+        return int(End.RUNNING)
+    if k.both:
+        return int(End.HELD)
+    return int(End.SLIPPED)
+
+
+@wp.func
 def judge_hold(c: Constants, state: WorldStates, w: int, k: Check):
     """Waits at the end of the lift."""
     if k.blocker < NO_BODY:
@@ -482,6 +548,8 @@ def judge(
         end = int(End.UNPLANNED_TOUCH)
     elif phase == CLOSE:
         end = judge_close(c, trials, state, physics, w, k)
+    elif phase == LIFT and c.shakes == 1:
+        end = judge_shake(trials, state, w, k)
     elif phase == LIFT:
         end = judge_lift(c, trials, state, physics, w, k)
     else:

@@ -11,6 +11,7 @@ import numpy as np
 from burg_drake.core import Array, Indices, inverse
 from burg_drake.simulation.hand_carrier import check_count
 from burg_drake.simulation.mujoco_trial import MujocoTrial
+from burg_drake.simulation.shaking import shake_checks, turning_axis
 
 
 class End(IntEnum):
@@ -53,6 +54,7 @@ class TrialStarts:
         friction, mass: (N,) of the target.
         pads: (N, 2, 3) see `MujocoWorld.pad_contacts`.
         early: (N,) whether the trial may end before the end of its lift.
+        turn: (N,) sense in which a shaken hand turns first, see `turning_axis`.
         ways: (N, 3, 4) approach, if any, and one or two segments: direction and length [m].
         checks: (N, 3) number of contact checks of each; 0 if there is none.
         time: (N,) duration of the segments with the target [s].
@@ -67,6 +69,7 @@ class TrialStarts:
     mass: Array
     pads: Array
     early: Array
+    turn: Array
     ways: Array
     checks: Array
     time: Array
@@ -142,16 +145,7 @@ def trial_starts(
     X_WH = np.array([X @ X_GH for X in X_WF])
     X_GO = np.array([inverse(X) @ X_WO for X in X_WF])
     closed = np.zeros(len(X_WG)) if approaches else trial.closed_before_contacts(instance, X_WG)
-    ways = np.zeros((len(X_WG), 3, 4))
-    if approaches:
-        ways[:, 0, :3], ways[:, 0, 3] = X_WG[:, :3, 2], trial.motion.standoff
-    for way, X, lift in zip(ways, X_WG, loads.lift.tolist(), strict=True):
-        for row, path in enumerate(trial.lift_paths(X, lift), start=1):
-            way[row] = *path.direction_W, path.length
-    lengths, inverse_rows = np.unique(ways[:, :, 3], return_inverse=True)
-    counts = [check_count(length, trial.settings) if length else 0 for length in lengths]
-    times = np.array([trial.settings.time_of(length) for length in lengths])
-    at = inverse_rows.reshape(len(X_WG), 3)
+    ways, checks, time = _ways(trial, X_WG, loads.lift)
     return TrialStarts(
         p_WH=X_WH[:, :3, 3],
         R_WH=X_WH[:, :3, :3],
@@ -162,7 +156,28 @@ def trial_starts(
         mass=loads.mass,
         pads=pads,
         early=np.full(len(X_WG), not trial.engine.whole_trial),
+        turn=np.array([turning_axis(X[:3, :3].T)[0] for X in X_GO]),
         ways=ways,
-        checks=np.array(counts)[at],
-        time=times[at[:, 1]] + times[at[:, 2]],
+        checks=checks,
+        time=time,
     )
+
+
+def _ways(trial: MujocoTrial, X_WG: Array, lift: Array) -> tuple[Array, Indices, Array]:
+    """The `ways`, `checks` and `time` of trials."""
+    settings, n = trial.settings, len(X_WG)
+    ways = np.zeros((n, 3, 4))
+    if settings.shake is not None:
+        ways[:, 1, 2] = 1.0
+        checks = np.tile([0, shake_checks(settings), 0], (n, 1))
+        return ways, checks, np.full(n, settings.shake.duration)
+    if trial.approaches:
+        ways[:, 0, :3], ways[:, 0, 3] = X_WG[:, :3, 2], trial.motion.standoff
+    for way, X, height in zip(ways, X_WG, lift.tolist(), strict=True):
+        for row, path in enumerate(trial.lift_paths(X, height), start=1):
+            way[row] = *path.direction_W, path.length
+    lengths, inverse_rows = np.unique(ways[:, :, 3], return_inverse=True)
+    counts = [check_count(length, settings) if length else 0 for length in lengths]
+    times = np.array([settings.time_of(length) for length in lengths])
+    at = inverse_rows.reshape(n, 3)
+    return ways, np.array(counts)[at], times[at[:, 1]] + times[at[:, 2]]
