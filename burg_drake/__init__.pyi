@@ -34,6 +34,7 @@ from .evaluation import (
     SamplingSettings as SamplingSettings,
     evaluate as evaluate,
     load_campaign as load_campaign,
+    label_library as label_library,
     load_run as load_run,
     reach as reach,
     read_results as read_results,

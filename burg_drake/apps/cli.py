@@ -79,13 +79,14 @@ COMMANDS = {
         Verb("setup", "setup", "arrange a scene in the browser: place, check, save, print"),
     ),
     "grasps": (
-        Verb("grasps", None, "sample, score, show, convert and compare grasps"),
+        Verb("grasps", None, "sample, score, label, show, convert and compare grasps"),
         Verb("grasps sample", "grasp_sampling", "sample antipodal grasps on objects"),
         Verb(
             "grasps score",
             "grasp_sampling",
             "score grasps by formulas: force closure, epsilon, load",
         ),
+        Verb("grasps label", "grasp_labelling", "label grasps of objects: held or lost when tried"),
         Verb("grasps show", "grasp_display", "show grasps in 3D, coloured by outcome or score"),
         Verb("grasps convert", "grasp_formats", "convert grasps between formats"),
         Verb(

@@ -175,6 +175,11 @@ from .judge import (
     screen_grasps as screen_grasps,
     trial_verdict as trial_verdict,
 )
+from .labelling import (
+    ObjectLabels as ObjectLabels,
+    label_library as label_library,
+    scene_of_one as scene_of_one,
+)
 from .many_scenes import campaign_document as campaign_document, read_scenes as read_scenes
 from .outcome_counts import (
     MIN_PUSH as MIN_PUSH,

@@ -503,7 +503,8 @@ class HandJudge(StationJudge):
             self._trial = hand_trial_of(scene, station, engine, settings=settings)
         motion = self._trial.motion
         X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
-        shortened = mode == "hand" and motion.shortest < motion.lift_height
+        self._lifts = settings.shake is None
+        shortened = mode == "hand" and self._lifts and motion.shortest < motion.lift_height
         free_lift = FreeLift(scene, station, motion) if shortened else None
         screens = [hand_screen(self._trial.clearance, X_WO, free_lift)]
         if mode == "reach":
@@ -550,8 +551,10 @@ class HandJudge(StationJudge):
         return self._trial.motion.lift_height if grasp.lift is None else grasp.lift
 
     def _decision(self, grasp: Candidate, result: TrialResult) -> Decision:
-        lift = {MarginNames.lift_height: self._lift_of(grasp)}
         decision = trial_decision(result)
+        if not self._lifts:
+            return decision
+        lift = {MarginNames.lift_height: self._lift_of(grasp)}
         return replace(decision, margins={**decision.margins, **lift})
 
 

@@ -28,7 +28,12 @@ from burg_drake.evaluation.judge import StationJudge, build_judge, judge_grasp, 
 from burg_drake.evaluation.results_table import RecordedTrial
 from burg_drake.evaluation.run_document import HASH_DIGITS
 from burg_drake.evaluation.run_folder import RUN_FILE, load_run
-from burg_drake.evaluation.trial_origin import TrialOrigin, motion_text
+from burg_drake.evaluation.trial_origin import (
+    TrialOrigin,
+    motion_text,
+    protocol_of,
+    recorded_motion_text,
+)
 from burg_drake.motion import Plan
 from burg_drake.scene import Scene, load_scene
 from burg_drake.simulation import TrialResult
@@ -280,6 +285,11 @@ def arm_figures(verdict: Verdict) -> list[str]:
 
 def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
     """Motion of the hand as lines of text; empty for the default motion."""
+    if protocol_of(origin.trial) == "shake":
+        return [
+            f"motion: {recorded_motion_text(origin.trial)}; shown in the frame of the hand, which"
+            " therefore stands still"
+        ]
     motion = origin.settings().motion
     if motion is None or motion == GraspMotion():
         return []

@@ -19,9 +19,8 @@ from burg_drake.evaluation.trial_origin import (
     engine_label,
     limits_text,
     measure_text,
-    motion_text,
     other_numbers,
-    read_motion,
+    recorded_motion_text,
 )
 
 SETTINGS_TOPIC = "settings of engine, trial and arm"
@@ -51,7 +50,7 @@ def request_identity(document: AnyRunDocument) -> dict[str, str]:
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
         SETTINGS_TOPIC: settings,
-        "motion": motion_text(read_motion(document.trial)),
+        "motion": recorded_motion_text(document.trial),
         "limit in the hand": limits_text(document.trial),
         "motion of others": measure_text(document.trial),
         **({} if document.mode == "arm" else {"approach of the hand": simulated}),

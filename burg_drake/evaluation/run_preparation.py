@@ -145,6 +145,11 @@ class RunRequest:
                 "approach is given with mode arm, in which the whole arm approaches"
                 " anyway; leave approach out, or give mode hand or reach"
             ).about("approach")
+        if settings.protocol == "shake" and (mode != "hand" or settings.approach):
+            raise InvalidInputError(
+                "protocol shake is for the hand alone, which begins at the grasp; give mode hand,"
+                " without approach"
+            ).about("protocol", "mode", "approach")
         motion = settings.motion or station.document.motion
         if settings.approach and motion.standoff <= 0.0:
             own = motion == station.document.motion
@@ -310,13 +315,14 @@ class RunRequest:
     @property
     def trial_settings(self) -> TrialSettings:
         """Settings of the trials."""
-        from burg_drake.simulation import TrialSettings
+        from burg_drake.simulation import ShakeSettings, TrialSettings
 
         return TrialSettings(
             motion=self.motion,
             tilt_limit=math.radians(self.settings.tilt_limit_deg),
             slip_limit=self.settings.slip_limit_mm / 1000.0,
             approach=self.settings.approach,
+            shake=ShakeSettings() if self.settings.protocol == "shake" else None,
         )
 
 

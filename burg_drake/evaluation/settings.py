@@ -19,7 +19,14 @@ from burg_drake.core import (
     setting,
     suggest_names,
 )
-from burg_drake.simulation import DEFAULT_TRIAL, FrictionSettings, LoadSettings, Noise
+from burg_drake.simulation import (
+    DEFAULT_TRIAL,
+    TRIAL_PROTOCOLS,
+    FrictionSettings,
+    LoadSettings,
+    Noise,
+    TrialProtocol,
+)
 from burg_drake.station import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
@@ -210,6 +217,8 @@ class EvaluationSettings:
             pregrasp. Otherwise they begin with the open hand at the grasp. The whole arm always
             approaches.
         motion: approach, retreat and lift of the hand; the station's if None.
+        protocol: `lift`: the hand lifts a gripped object. `shake`: it is shaken with the object,
+            which is alone and has no weight; only in mode `hand`. See `ShakeSettings`.
         seed: seed of the sampling.
         shard: a share of the work, such as `2/8`: every eighth scene, or every eighth grasp of each
             scene if there are fewer than eight. `merge_runs` merges the shards.
@@ -287,6 +296,12 @@ class EvaluationSettings:
     )
     approach: bool = setting(False, "with the hand alone, simulate its straight approach, too")
     motion: GraspMotion | None = None
+    protocol: TrialProtocol = setting(
+        "lift",
+        "with the hand alone, lift: lift the object off the table; shake: shake it, without"
+        " gravity, in a scene where it is alone in the air",
+        choices=TRIAL_PROTOCOLS,
+    )
     seed: int = setting(0, "random seed of the sampling", high=MAX_DOCUMENT_SEED)
     shard: Shard | str | None = setting(
         None,

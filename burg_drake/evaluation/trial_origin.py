@@ -22,14 +22,14 @@ from burg_drake.core import (
 from burg_drake.station import ENGINES, Engine, GraspMotion, as_engine
 
 if TYPE_CHECKING:
-    from burg_drake.simulation import TrialSettings
+    from burg_drake.simulation import TrialProtocol, TrialSettings
 
 MEASURE_NUMBERS = {"farthest_point": 1.0}
 """Recorded numbers that identify how runs of this release measure displacements."""
 
 
 def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
-    """Limits and approach as fields of `EvaluationSettings`, from recorded numbers.
+    """Limits, approach and protocol as fields of `EvaluationSettings`, from recorded numbers.
 
     A limit that is not recorded, as by releases before there were limits, is no limit.
 
@@ -40,7 +40,13 @@ def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
         "tilt_limit_deg": _limit_degrees(values.get("tilt_limit", math.pi)),
         "slip_limit_mm": _limit_millimetres(values.get("slip_limit", math.inf)),
         "approach": bool(values.get("approach", False)),
+        "protocol": protocol_of(values),
     }
+
+
+def protocol_of(values: Mapping[str, float]) -> TrialProtocol:
+    """Protocol of trials with recorded settings."""
+    return "shake" if "shake_periods" in values else "lift"
 
 
 def measure_text(values: Mapping[str, float]) -> str:
@@ -106,6 +112,19 @@ def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
     """Recorded numbers without motion, limits, approach and measures."""
     known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS)
     return {name: value for name, value in without_motion(values).items() if name not in known}
+
+
+def recorded_motion_text(values: Mapping[str, float]) -> str:
+    """Describes the motion of trials with recorded settings in words."""
+    if protocol_of(values) == "lift":
+        return motion_text(read_motion(values))
+    periods, frequency = values["shake_periods"], values["shake_frequency"]
+    return (
+        f"shaken {periods:g} times along the approach, up to"
+        f" {values['shake_acceleration']:g} m/s2, and {periods:g} times about the closing axis, up"
+        f" to {values['turn_acceleration']:g} rad/s2, at {frequency:g} Hz; the object alone,"
+        " without gravity"
+    )
 
 
 def motion_text(motion: GraspMotion) -> str:
@@ -258,12 +277,17 @@ def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings
     Raises:
         InvalidInputError: a setting is unknown or not valid.
     """
-    from burg_drake.simulation import NO_GRIP_LIMITS, TrialSettings
+    from burg_drake.simulation import NO_GRIP_LIMITS, ShakeSettings, TrialSettings
 
     trial = {name: value for name, value in trial.items() if name not in MEASURE_NUMBERS}
     others, values = without_motion(trial), join_direction(trial)
     motion = {name: value for name, value in values.items() if name not in others}
+    shaken = {f.name: others[f.name] for f in fields(ShakeSettings) if f.name in others}
+    others = {name: value for name, value in others.items() if name not in shaken}
     settings = _read_typed(_restore_booleans(others, TrialSettings), TrialSettings, where)
+    if protocol_of(trial) == "shake":
+        shaken["shake_periods"] = round(shaken["shake_periods"])
+        settings = replace(settings, shake=_read_typed(shaken, ShakeSettings, where))
     limits = {name: others.get(name, none) for name, none in NO_GRIP_LIMITS.items()}
     tilt, slip = limits["tilt_limit"], limits["slip_limit"]
     hand = _read_typed(motion, GraspMotion, where)

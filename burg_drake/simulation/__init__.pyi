@@ -73,11 +73,15 @@ from .settings import (
     REFERENCE_LIFT_LENGTH as REFERENCE_LIFT_LENGTH,
     SETTLING_ENGINE as SETTLING_ENGINE,
     SETTLING_TIME as SETTLING_TIME,
+    TRIAL_PROTOCOLS as TRIAL_PROTOCOLS,
     FrictionSettings as FrictionSettings,
     LoadSettings as LoadSettings,
     Noise as Noise,
+    ShakeSettings as ShakeSettings,
+    TrialProtocol as TrialProtocol,
     TrialSettings as TrialSettings,
 )
+from .shaking import Shaking as Shaking, height_to_shake as height_to_shake
 from .settled_scene import SettledScene as SettledScene, settle_scene as settle_scene
 from .stable_pose_drops import (
     Confirmation as Confirmation,

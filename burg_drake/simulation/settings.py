@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal, get_args
 
 from burg_drake.core import InvalidInputError, Ranges, Units, require_ranges, setting
 from burg_drake.station import GraspMotion
@@ -14,6 +14,12 @@ MAX_PHASE_DURATION = 30.0
 
 REFERENCE_LIFT_LENGTH = 0.30
 """Metres. Length that `lift_time` refers to."""
+
+
+TrialProtocol = Literal["lift", "shake"]
+"""What a hand does with a gripped target: lift it off the table, or shake it, alone and without
+gravity."""
+TRIAL_PROTOCOLS: tuple[TrialProtocol, ...] = get_args(TrialProtocol)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,8 +25,8 @@ from burg_drake.evaluation.trial_origin import (
     engine_label,
     limit_settings,
     motion_options,
-    motion_text,
     read_motion,
+    recorded_motion_text,
     without_motion,
 )
 from burg_drake.station import ENGINES, Engine, StationDocument
@@ -200,7 +200,7 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
     return [
         ("station", _content_text(document.station)),
         ("mode", f"{document.mode}: {MODE_MEANINGS[document.mode]}{approach}"),
-        ("motion", motion_text(read_motion(document.trial))),
+        ("motion", recorded_motion_text(document.trial)),
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
         ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
@@ -243,7 +243,7 @@ def _setting_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, 
     engine = document.engine
     return [
         ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
-        ("motion", motion_text(read_motion(document.trial))),
+        ("motion", recorded_motion_text(document.trial)),
         ("trial", _settings_list(without_motion(document.trial))),
         ("mode", document.mode),
         ("arm", _settings_list(without_motion(document.arm)) if document.arm else "not asked"),

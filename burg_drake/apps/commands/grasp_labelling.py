@@ -1,0 +1,131 @@
+"""`burg-drake grasps label`: labels grasps of the objects of a library, each by itself."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake import core, evaluation
+from burg_drake.apps import options
+from burg_drake.apps.terminal import print_note_lines, print_remark
+
+
+def add_grasps_label_options(parser: options.Parser) -> None:
+    """Adds the options of `burg-drake grasps label`."""
+    parser.epilog = options.examples_text(
+        "burg-drake grasps label household -n 2000 --to acronym -o labels/",
+        "burg-drake grasps label my_library/ --protocol shake --engine mujoco -o shaken/",
+        "burg-drake grasps label household -n 2000 --engine mujoco-gpu --to acronym -o labels/",
+        "burg-drake grasps label my_library/ --grasps Mug_3f2a_0.01.h5 --rename mug -o again/",
+        "",
+        "The same command continues where an interrupted one stopped.",
+    )
+    parser.set_defaults(after_interrupt="; run the same command to continue")
+    parser.add_argument("library", metavar="LIBRARY", help="library folder, or built-in name")
+    options.add_output(parser, "FOLDER", "folder for a file of grasps per object, scenes and runs")
+    options.add_format_option(parser)
+    source_group = parser.add_mutually_exclusive_group()
+    options.add_sampling_options(parser, 100, source_group)
+    source_group.add_argument(
+        "--grasps",
+        metavar="FILE|RUN",
+        type=options.input_file,
+        help="label the grasps of this file or run, instead of sampling",
+    )
+    options.add_reading_options(parser)
+    options.add_renaming(parser)
+    options.add_station(parser)
+    options.add_settings_options(
+        parser,
+        evaluation.EvaluationSettings,
+        *("protocol", "engine", "device", "tilt_limit_deg", "slip_limit_mm"),
+    )
+    workers_group = parser.add_mutually_exclusive_group()
+    options.add_workers(workers_group)
+    options.add_cluster(workers_group)
+    options.add_retry_failed(parser, "grasps")
+    options.add_quiet(parser)
+
+
+def run_grasps_label(arguments: argparse.Namespace) -> int:
+    """Labels grasps and writes a file for each object; returns 1 if some were not simulated."""
+    from burg_drake.objects import load_library
+    from burg_drake.station import load_station
+
+    options.refuse_sampling_options_with_file(arguments)
+    library, station = load_library(arguments.library), load_station(arguments.station)
+    settings = options.settings_from(
+        arguments,
+        evaluation.EvaluationSettings,
+        grasps_per_object=options.grasps_per_object(arguments),
+    )
+    grasps = _given_grasps(arguments)
+    labelled = []
+    with options.cluster_from_options(arguments) as executor:
+        for found in evaluation.label_library(
+            library,
+            station,
+            arguments.output,
+            format=arguments.target or "burg_drake",
+            only=arguments.only,
+            grasps=grasps,
+            settings=settings,
+            executor=executor,
+            workers=arguments.workers,
+            retry_failed=arguments.retry_failed,
+            progress=not arguments.quiet,
+        ):
+            print(f"wrote {len(found.success)} labelled grasps to {found.path}")
+            options.print_notes(found.notes)
+            labelled.append(found)
+    labels_table(labelled).show()
+    failures = sum(len(found.run.failures) for found in labelled)
+    if failures:
+        interrupted = sum(len(found.run.interrupted) for found in labelled)
+        print_remark(
+            f"{failures} grasps could not be simulated and have no label;"
+            f" {options.retry_advice(interrupted, failures)}"
+        )
+    return 1 if failures else 0
+
+
+def _given_grasps(arguments: argparse.Namespace) -> core.GraspSet | None:
+    """The grasps of --grasps with their objects renamed."""
+    from burg_drake.formats import with_objects_renamed
+
+    if arguments.grasps is None:
+        return None
+    gripper = options.gripper_from_options(
+        arguments, options.station_from_options(arguments, arguments.grasps)
+    )
+    imported = evaluation.read_input(
+        arguments.grasps, arguments.source, gripper, arguments.correction
+    )
+    if imported.frame != "object":
+        raise core.InvalidInputError(
+            f"{arguments.grasps} has grasps in the {imported.frame} frame; bring them into those"
+            " of the objects with `burg-drake grasps convert`"
+        )
+    print_note_lines(imported.notes)
+    return with_objects_renamed(imported.grasps, dict(arguments.rename))
+
+
+def labels_table(labelled: Sequence[evaluation.ObjectLabels]) -> core.TextTable:
+    """Table of labelled grasps by object; with the agreement where they came with labels."""
+    told = any(np.isfinite(found.given).any() for found in labelled)
+    table = core.TextTable().names("object").numbers("grasps", "success", "share")
+    if told:
+        table.numbers("as given")
+    for found in labelled:
+        known = np.isfinite(found.success)
+        success = int(found.success[known].sum())
+        share = core.format_percent(success / known.sum()) if known.any() else "-"
+        cells = [*map(core.format_count, (len(known), success)), share]
+        if told:
+            both = known & np.isfinite(found.given)
+            same = found.success[both] == found.given[both]
+            cells.append(f"{core.format_percent(same.mean())} of {len(same)}" if len(same) else "-")
+        table.row(found.object, *cells)
+    return table
