@@ -20,7 +20,6 @@ from burg_drake.core import (
     InvalidInputError,
     MissingDependencyError,
     quaternion_from_rotation,
-    rotation_from_quaternion,
 )
 from burg_drake.export import (
     HAND_CARRIER_BODY,
@@ -345,15 +344,18 @@ class MujocoWorld:
         # From positions and speeds, as poses of bodies are those before the last step.
         model, data, k = self.model, self.data, int(body)
         at, dof = model.jnt_qposadr[model.body_jntadr[k]], model.body_dofadr[k]
-        R_WB = rotation_from_quaternion(data.qpos[at + 3 : at + 7])
-        p_BCm_W = R_WB @ model.body_ipos[k]
-        axes = R_WB @ rotation_from_quaternion(model.body_iquat[k])
-        w_W = R_WB @ data.qvel[dof + 3 : dof + 6]
+        R_WB, R_BI = np.zeros(9), np.zeros(9)
+        self._mj.mju_quat2Mat(R_WB, data.qpos[at + 3 : at + 7])
+        self._mj.mju_quat2Mat(R_BI, model.body_iquat[k])
+        R_WB = R_WB.reshape(3, 3)
+        p_BCm_W, axes = R_WB @ model.body_ipos[k], R_WB @ R_BI.reshape(3, 3)
+        w_W, v_WCm = R_WB @ data.qvel[dof + 3 : dof + 6], np.zeros(3)
+        self._mj.mju_cross(v_WCm, w_W, p_BCm_W)
         return MovingBody(
             float(model.body_mass[k]),
             (axes * model.body_inertia[k]) @ axes.T,
             data.qpos[at : at + 3] + p_BCm_W,
-            data.qvel[dof : dof + 3] + np.cross(w_W, p_BCm_W),
+            data.qvel[dof : dof + 3] + v_WCm,
             w_W,
         )
 

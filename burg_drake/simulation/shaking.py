@@ -114,14 +114,22 @@ class Shaking:
             body: state of the body.
         """
         along, about = self.strokes(time)
-        w, alpha = about[1] * self._axis, about[2] * self._axis
-        r, inertia = body.p_W - self._origin, body.I_W
-        acceleration = along[2] * self._approach + np.cross(alpha, r)
-        acceleration += np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, body.v_W)
-        torque = inertia @ alpha + np.cross(w, inertia @ w)
-        torque += np.cross(body.w_W, inertia @ w) - inertia @ np.cross(body.w_W, w)
-        torque += np.cross(w, inertia @ body.w_W)
+        acceleration = along[2] * self._approach
+        if not about.any():
+            return -body.mass * acceleration, np.zeros(3)
+        W, A, B = (_cross(v) for v in (about[1] * self._axis, about[2] * self._axis, body.w_W))
+        w, inertia = about[1] * self._axis, body.I_W
+        acceleration = acceleration + (A + W @ W) @ (body.p_W - self._origin)
+        acceleration += 2.0 * W @ body.v_W
+        torque = inertia @ (about[2] * self._axis - B @ w) + (W + B) @ inertia @ w
+        torque += W @ inertia @ body.w_W
         return -body.mass * acceleration, -torque
+
+
+def _cross(v: Array) -> Array:
+    """Matrix (3, 3) of the vector product with v (3,) from the left."""
+    x, y, z = v.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def shake_checks(settings: TrialSettings) -> int:
