@@ -11,6 +11,8 @@ on Simulation", ICRA 2021, as `load_mesh` and `load_grasps` in acronym_tools/acr
   `load_mesh` applies to it. `object/mass`, `friction`, `inertia`, `com`, `density`, `volume`
   describe it further.
 - `gripper/type` is `panda`, `gripper/configuration` the opening of each finger.
+- Labels of other simulators have the JSON attribute `labelled_by` at the root: engine, protocol and
+  settings of the trials.
 - Files are named after category, mesh and scale: `Mug_10f6..._0.0002682457830986903.h5`.
 
 The gripper frame has its origin at the hand's base, which for the Panda is the frame of its link
@@ -24,6 +26,7 @@ Written files have further columns in `grasps/qualities/burg_drake`, next to `fl
 from __future__ import annotations
 
 import io
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -49,6 +52,7 @@ from burg_drake.core import (
 from burg_drake.formats.grasp_conversion import (
     GRASP_SUCCESS_COLUMN,
     HAND_ALIASES,
+    LABELLED_BY,
     check_gripper_name,
     object_name,
     require_single_object,
@@ -128,7 +132,9 @@ def _read_tree(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
         width=width,
         score=score,
         columns=columns,
-        provenance=file_provenance(ACRONYM_FORMAT, path, object_files={name: description}),
+        provenance=file_provenance(
+            ACRONYM_FORMAT, path, object_files={name: description}, **_read_labelled_by(file)
+        ),
     )
     return ImportedGrasps(grasps, "object", (*notes, *rounded, scale_note(name, mesh, scale)))
 
@@ -154,6 +160,14 @@ def _read_qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
             plain = plain or (simulator == "burg_drake" and name in ("score", "width"))
             columns[name if plain else f"{simulator}.{name}"] = values.astype(float)
     return columns
+
+
+def _read_labelled_by(file: Hdf5File) -> dict[str, Any]:
+    """The attribute `labelled_by` as an entry of a provenance; empty if there is none to read."""
+    try:
+        return {LABELLED_BY: json.loads(file.attribute(LABELLED_BY))}
+    except (KeyError, TypeError, ValueError):
+        return {}
 
 
 def _read_number(file: Hdf5File, key: str) -> float:
@@ -192,6 +206,8 @@ def write_acronym(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, 
         foreign = {ours: theirs for theirs, ours in reversed(HAND_ALIASES.items())}
         file["gripper/type"] = foreign.get(gripper.name, gripper.name)
         file["gripper/configuration"] = np.array([gripper.opening[1] / 2.0])
+        if LABELLED_BY in grasps.provenance:
+            file.attrs[LABELLED_BY] = json.dumps(grasps.provenance[LABELLED_BY])
         packed = {"compression": "gzip", "shuffle": True}
         file.create_dataset(TRANSFORMS, data=grasps.X_OG @ gripper.X_GB, **packed)
         for key, values in _quality_arrays(grasps, success).items():

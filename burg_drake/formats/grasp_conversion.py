@@ -29,6 +29,9 @@ from burg_drake.core import (
 )
 from burg_drake.formats.grasp_format import GraspFormat, Gripper
 
+LABELLED_BY = "labelled_by"
+"""Entry of a provenance: engine, protocol and settings of the trials that labelled grasps."""
+
 GRASP_SUCCESS_COLUMN = "object_in_gripper"
 """Column: 1 if the grasp holds its object, 0 if not, NaN if unknown."""
 
@@ -112,7 +115,8 @@ def success_labels(grasps: GraspSet) -> Array:
     if "outcome" in grasps.columns:
         outcome = grasps.columns["outcome"]
         lifted = (outcome == Outcome.LIFTED.value).astype(float)
-        return np.where(np.isin(outcome, UNTRIED_OUTCOMES), np.nan, lifted)
+        unknown = (*UNTRIED_OUTCOMES, Outcome.SIMULATION_FAILED.value)
+        return np.where(np.isin(outcome, unknown), np.nan, lifted)
     if np.isin(grasps.score[~np.isnan(grasps.score)], (0.0, 1.0)).all():
         return grasps.score.copy()
     return np.full(len(grasps), np.nan)

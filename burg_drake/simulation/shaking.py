@@ -80,7 +80,7 @@ class Shaking:
         self._approach, self._origin = X_WG[:3, 2], X_WG[:3, 3]
         self._axis = X_WG[:3, :3] @ turning_axis(X_WO[:3, :3].T @ X_WG[:3, :3])
 
-    def strokes(self, time: float) -> tuple[Array, Array]:
+    def _strokes(self, time: float) -> tuple[Array, Array]:
         """Position, speed and acceleration along the approach (3,) [m], and the same about the
         closing axis (3,) [rad].
 
@@ -105,23 +105,25 @@ class Shaking:
             [(1.0 - math.cos(phase)) / omega**2, math.sin(phase) / omega, math.cos(phase)]
         )
 
-    def wrench(self, time: float, body: MovingBody) -> tuple[Array, Array]:
-        """Inertial force (3,) at the centre of mass [N] and torque (3,) [N m] on a body, in the
-        world; Euler's equations in the frame of the hand.
+    def wrench(self, time: float, step: float, body: MovingBody) -> tuple[Array, Array]:
+        """Inertial force (3,) at the centre of mass [N] and torque (3,) [N m] on a body during a
+        time step, in the world; Euler's equations in the frame of the hand.
 
         Args:
-            time: time since the shaking began [s].
-            body: state of the body.
+            time: start of the step since the shaking began [s].
+            step: its length [s].
+            body: state of the body at the start, with whose speeds those of the hand go.
         """
-        along, about = self.strokes(time)
-        acceleration = along[2] * self._approach
-        if not about.any():
+        (_, speed, _), now = self._strokes(time)[1], self._strokes(time + 0.5 * step)
+        acceleration = now[0][2] * self._approach
+        w, alpha = speed * self._axis, now[1][2] * self._axis
+        if not (w.any() or alpha.any()):
             return -body.mass * acceleration, np.zeros(3)
-        W, A, B = (_cross(v) for v in (about[1] * self._axis, about[2] * self._axis, body.w_W))
-        w, inertia = about[1] * self._axis, body.I_W
+        W, A, B = _cross(w), _cross(alpha), _cross(body.w_W)
+        inertia = body.I_W
         acceleration = acceleration + (A + W @ W) @ (body.p_W - self._origin)
         acceleration += 2.0 * W @ body.v_W
-        torque = inertia @ (about[2] * self._axis - B @ w) + (W + B) @ inertia @ w
+        torque = inertia @ (alpha - B @ w) + (W + B) @ inertia @ w
         torque += W @ inertia @ body.w_W
         return -body.mass * acceleration, -torque
 
@@ -182,9 +184,9 @@ class ShakeCarrier:
             body = world.moving_body(self._target)
             force = -body.mass * world.gravity
             torque = np.zeros(3)
-            since = world.time + 0.5 * step - self._begun
-            if since > 0.0:
-                inertial, torque = self._shaking.wrench(since, body)
+            since = world.time - self._begun
+            if since >= 0.0:
+                inertial, torque = self._shaking.wrench(since, step, body)
                 force = force + inertial
             world.push(self._target, force, torque)
             world.advance(1)

@@ -78,9 +78,9 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             progress=not arguments.quiet,
         ):
             print(f"wrote {len(found.success)} labelled grasps to {found.path}")
-            options.print_notes(found.notes)
             labelled.append(found)
     labels_table(labelled).show()
+    print_note_lines(dict.fromkeys(note for found in labelled for note in found.notes))
     failures = sum(len(found.run.failures) for found in labelled)
     if failures:
         interrupted = sum(len(found.run.interrupted) for found in labelled)

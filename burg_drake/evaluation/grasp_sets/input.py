@@ -30,8 +30,10 @@ from burg_drake.evaluation.grasp_sets.pose_mistakes import check_corrections, co
 from burg_drake.evaluation.results_table import TEXT_COLUMNS
 from burg_drake.evaluation.run_folder import SCENE_FILE, STATION_FILE, Run, load_run
 from burg_drake.evaluation.table_file import is_table
+from burg_drake.evaluation.trial_origin import protocol_of
 from burg_drake.formats import (
     GRASP_FORMATS,
+    LABELLED_BY,
     PANDA_GRIPPER,
     Gripper,
     ImportedGrasps,
@@ -136,7 +138,15 @@ def run_documents(run: Run) -> dict[str, Any]:
     gone or have changed.
     """
     folder = run.path.resolve()
+    recorded = run.document
     named: dict[str, Any] = {
+        LABELLED_BY: {
+            "engine": recorded.engine.name,
+            "protocol": protocol_of(recorded.trial),
+            "mode": recorded.mode,
+            "trial": recorded.trial,
+            "versions": recorded.versions,
+        },
         "run": str(folder),
         "scene": str(folder / SCENE_FILE),
         "station": str(folder / STATION_FILE),

@@ -69,16 +69,19 @@ def stroke(periods: float, acceleration: float, frequency: float):
 def shake_target(c: Constants, trials: Trials, state: WorldStates, physics: Physics, w: int):
     """Applies the forces of a shaken hand to the target for the next step, as `Shaking` does."""
     # `command_lift` has counted the next step.
-    periods = (float(state.step[w]) - 0.5) * c.step * c.shake_frequency
-    along, about = wp.vec2(0.0, 0.0), wp.vec2(0.0, 0.0)
-    if periods < c.shake_periods:
-        along = stroke(periods, c.shake_acceleration, c.shake_frequency)
-    elif periods < 2.0 * c.shake_periods:
-        about = stroke(periods - c.shake_periods, c.turn_acceleration, c.shake_frequency)
+    begin = (float(state.step[w]) - 1.0) * c.step * c.shake_frequency
+    middle = begin + 0.5 * c.step * c.shake_frequency
+    speed, alpha_size, along = float(0.0), float(0.0), float(0.0)
+    if middle < c.shake_periods:
+        along = stroke(middle, c.shake_acceleration, c.shake_frequency)[1]
+    elif middle < 2.0 * c.shake_periods:
+        alpha_size = stroke(middle - c.shake_periods, c.turn_acceleration, c.shake_frequency)[1]
+    if begin >= c.shake_periods and begin < 2.0 * c.shake_periods:
+        speed = stroke(begin - c.shake_periods, c.turn_acceleration, c.shake_frequency)[0]
     q_WG = to_xyzw(physics.xquat[w, c.hand]) * c.q_HG
     side = float(trials.turn[state.trial[w]])
     axis = wp.quat_rotate(q_WG, wp.vec3(side, 0.0, 0.0))
-    omega, alpha = about[0] * axis, about[1] * axis
+    omega, alpha = speed * axis, alpha_size * axis
     p, v = c.target_qpos, c.target_dof
     q_WO = wp.normalize(
         wp.quat(
@@ -97,7 +100,7 @@ def shake_target(c: Constants, trials: Trials, state: WorldStates, physics: Phys
     principal = physics.body_inertia[w, c.target]
     axes = wp.quat_to_matrix(q_WO * c.q_OI)
     inertia = axes * wp.diag(principal) * wp.transpose(axes)
-    acceleration = along[1] * wp.quat_rotate(q_WG, wp.vec3(0.0, 0.0, 1.0)) + wp.cross(alpha, r)
+    acceleration = along * wp.quat_rotate(q_WG, wp.vec3(0.0, 0.0, 1.0)) + wp.cross(alpha, r)
     acceleration += wp.cross(omega, wp.cross(omega, r)) + 2.0 * wp.cross(omega, v_W)
     torque = inertia * alpha + wp.cross(omega, inertia * omega)
     torque += wp.cross(w_W, inertia * omega) - inertia * wp.cross(w_W, omega)
