@@ -81,8 +81,8 @@ from .settings import (
     TrialProtocol as TrialProtocol,
     TrialSettings as TrialSettings,
 )
-from .shaking import ShakeCarrier as ShakeCarrier, height_to_shake as height_to_shake
 from .settled_scene import SettledScene as SettledScene, settle_scene as settle_scene
+from .shaking import ShakeCarrier as ShakeCarrier, height_to_shake as height_to_shake
 from .stable_pose_drops import (
     Confirmation as Confirmation,
     DropSettings as DropSettings,

@@ -344,11 +344,10 @@ class MujocoWorld:
         # From positions and speeds, as poses of bodies are those before the last step.
         model, data, k = self.model, self.data, int(body)
         at, dof = model.jnt_qposadr[model.body_jntadr[k]], model.body_dofadr[k]
-        R_WB, R_BI = np.zeros(9), np.zeros(9)
-        self._mj.mju_quat2Mat(R_WB, data.qpos[at + 3 : at + 7])
-        self._mj.mju_quat2Mat(R_BI, model.body_iquat[k])
-        R_WB = R_WB.reshape(3, 3)
-        p_BCm_W, axes = R_WB @ model.body_ipos[k], R_WB @ R_BI.reshape(3, 3)
+        R_WB, R_BI = np.zeros((3, 3)), np.zeros((3, 3))
+        self._mj.mju_quat2Mat(R_WB.ravel(), data.qpos[at + 3 : at + 7])
+        self._mj.mju_quat2Mat(R_BI.ravel(), model.body_iquat[k])
+        p_BCm_W, axes = R_WB @ model.body_ipos[k], R_WB @ R_BI
         w_W, v_WCm = R_WB @ data.qvel[dof + 3 : dof + 6], np.zeros(3)
         self._mj.mju_cross(v_WCm, w_W, p_BCm_W)
         return MovingBody(

@@ -21,7 +21,6 @@ from burg_drake.simulation.trial_execution import Execution, HandSegment, Steppe
 from burg_drake.simulation.trial_result import TrialResult
 from burg_drake.station import Station, instance_pose
 
-
 FREE_SPACE = 0.3
 """Metres between a shaken object and all below it; neither hands nor what they hold are larger."""
 
@@ -159,7 +158,7 @@ class ShakeCarrier:
         self._shaking = Shaking(settings, world.X_WG(), world.X_WB(target))
         self._begun = math.inf
         up, checks = np.array([0.0, 0.0, 1.0]), shake_checks(world.settings)
-        self.segments = (HandSegment(up, 0.0, checks),)
+        self.segments: tuple[HandSegment, ...] = (HandSegment(up, 0.0, checks),)
         self.lift_time = settings.duration
 
     def approach(self) -> None:

@@ -138,7 +138,7 @@ def test_what_cannot_be_labelled_is_refused(
 
     with pytest.raises(InvalidInputError, match="has no mass"):
         label(only=["wall"])
-    with pytest.raises(UnknownNameError, match="no object 'cub'.*cube"):
+    with pytest.raises(UnknownNameError, match=r"no object 'cub'.*cube"):
         label(only=["cub"])
     with pytest.raises(InvalidInputError, match="in the camera frame"):
         label(format="graspnet")

@@ -30,6 +30,7 @@ from burg_drake.simulation import (
     NO_GRIP_LIMITS,
     BatchTrial,
     MujocoTrial,
+    ShakeSettings,
     TrialResult,
     TrialSettings,
 )
@@ -117,6 +118,27 @@ def test_the_same_with_fingers_swapped(results: list[TrialResult]) -> None:
     assert one.outcome is other.outcome
     assert other.margins.tilt == pytest.approx(one.margins.tilt, abs=np.deg2rad(1.0))
     assert other.margins.slip == pytest.approx(one.margins.slip, abs=2e-4)
+
+
+def test_shakes_as_the_engine_on_the_cpu_does(make_scene) -> None:
+    """Quickly along the approach and about the closing axis, near what the pads hold."""
+    scene = make_scene(Instance(object="box", X_SO=Pose((0.3, 0.2, 0.6), rpy_deg=(0, 0, 40.0))))
+    shake = ShakeSettings(
+        shake_acceleration=12.0, turn_acceleration=250.0, shake_frequency=8.0, shake_periods=1
+    )
+    settings = TrialSettings(shake=shake, **NO_GRIP_LIMITS)
+    X_OG = np.array([CENTRE, from_above(0.065, y=0.03), swap_fingers(from_above(0.065, y=0.03))])
+    friction = np.array([0.03, 0.15, 0.15])
+    found = batch_of(scene, settings=settings).run("box", X_OG, friction=friction)
+    single = MujocoTrial(scene, make_station(), settings=settings)
+    for result, X, mu in zip(found, X_OG, friction.tolist(), strict=True):
+        expected = single.run("box", X, friction=mu)
+        assert result.outcome is expected.outcome is Outcome.LIFTED
+        assert result.margins.slip == pytest.approx(expected.margins.slip, rel=0.1, abs=1e-4)
+        assert result.margins.tilt == pytest.approx(expected.margins.tilt, rel=0.1, abs=0.005)
+        assert np.isnan(result.margins.lift) and result.confidence is None
+    assert found[0].margins.slip > 3e-4
+    assert found[1].margins.tilt > np.deg2rad(2.0)
 
 
 # --- as one by one --------------------------------------------------------------------------------

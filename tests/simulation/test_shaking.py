@@ -10,7 +10,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 from trial_world import BOX_MASS, FORCE, from_above, make_station
 
-from burg_drake.core import Array, InvalidInputError, Outcome, Pose, inverse, make_pose, swap_fingers
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    Outcome,
+    Pose,
+    inverse,
+    make_pose,
+    swap_fingers,
+)
 from burg_drake.scene import Instance, Scene
 from burg_drake.simulation import (
     NO_GRIP_LIMITS,

@@ -163,13 +163,13 @@ def trial_starts(
     )
 
 
-def _ways(trial: MujocoTrial, X_WG: Array, lift: Array) -> tuple[Array, Indices, Array]:
+def _ways(trial: MujocoTrial, X_WG: Array, lift: Array) -> tuple[Array, Array, Array]:
     """The `ways`, `checks` and `time` of trials."""
     settings, n = trial.settings, len(X_WG)
     ways = np.zeros((n, 3, 4))
     if settings.shake is not None:
         ways[:, 1, 2] = 1.0
-        checks = np.tile([0, shake_checks(settings), 0], (n, 1))
+        checks = np.tile([0.0, shake_checks(settings), 0.0], (n, 1))
         return ways, checks, np.full(n, settings.shake.duration)
     if trial.approaches:
         ways[:, 0, :3], ways[:, 0, 3] = X_WG[:, :3, 2], trial.motion.standoff
@@ -180,4 +180,4 @@ def _ways(trial: MujocoTrial, X_WG: Array, lift: Array) -> tuple[Array, Indices,
     counts = [check_count(length, settings) if length else 0 for length in lengths]
     times = np.array([settings.time_of(length) for length in lengths])
     at = inverse_rows.reshape(n, 3)
-    return ways, np.array(counts)[at], times[at[:, 1]] + times[at[:, 2]]
+    return ways, np.array(counts, dtype=float)[at], times[at[:, 1]] + times[at[:, 2]]
