@@ -11,7 +11,17 @@ import pytest
 from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, die, expected, refuse
 
 from burg_drake.core import InvalidInputError, Outcome
-from burg_drake.evaluation import Candidate, Job, JobFailed, LocalExecutor, WorkerLimits
+from burg_drake.evaluation import (
+    Candidate,
+    Job,
+    JobFailed,
+    LocalExecutor,
+    StationJudgeFactory,
+    WorkerLimits,
+)
+from burg_drake.station import ENGINES
+
+cluster_jobs = pytest.importorskip("burg_drake.evaluation.cluster.jobs")
 
 
 def grasps(scene: str, n: int) -> list[Candidate]:
@@ -95,3 +105,27 @@ def test_workers_that_have_no_job_left_help_with_one(tmp_path: Path) -> None:
     built = [line.split() for line in log.read_text().splitlines()]
     assert Counter(name for name, _ in built) == {"long": 2, "short": 1}
     assert len({process for _, process in built}) == 2
+
+
+def test_workers_with_a_card_get_many_grasps_and_halves_of_lost_ones(scene, station) -> None:
+    factory = StationJudgeFactory(scene, station, ENGINES["mujoco-gpu"], "hand")
+    candidates = grasps("a", 40_000)
+    job = cluster_jobs.GraspJob(Job("a", factory, candidates), WorkerLimits(), None)
+    lost = job.take_chunk(2)
+    assert len(lost.items) == 16_384
+    assert not list(job.retry_alone(lost))
+    assert job.unsent_count == len(candidates)
+    first, second = job.take_chunk(2), job.take_chunk(2)
+    assert (*first.items, *second.items) == lost.items
+    alone = cluster_jobs.SentChunk(job, first.items[:1], losses=2)
+    ((_, grasp, verdict),) = job.retry_alone(alone)
+    assert grasp is first.items[0] and verdict.outcome is Outcome.SIMULATION_FAILED
+
+
+def test_workers_without_one_get_few_and_lost_ones_alone(scene, station) -> None:
+    factory = StationJudgeFactory(scene, station, ENGINES["mujoco"], "hand")
+    job = cluster_jobs.GraspJob(Job("a", factory, grasps("a", 100)), WorkerLimits(), None)
+    lost = job.take_chunk(1)
+    assert len(lost.items) == 32
+    assert not list(job.retry_alone(lost))
+    assert [len(job.take_chunk(1).items) for _ in range(33)] == [*[1] * 32, 32]

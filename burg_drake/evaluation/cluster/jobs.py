@@ -30,12 +30,14 @@ from burg_drake.evaluation.executor import (
     hopeless_error,
     report_failure,
 )
+from burg_drake.evaluation.judge import StationJudgeFactory
 
 
 class ChunkSettings:
     """Chunk size, and number of attempts for a grasp or a call."""
 
     max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
+    max_parallel_grasps = 16384  # With trials in parallel: as many as a card has worlds.
     max_losses = 3  # Workers lost at a grasp, the last ones alone, until it is given up.
 
 
@@ -89,8 +91,8 @@ class ClusterJob(ABC):
         what: purpose of the bundle, for messages.
         bundle: the bundle; None if none is needed.
         returned: items that workers did not begin; they are sent before further ones.
-        suspects: items at which a worker was lost, with the number of lost workers; each is sent
-            alone.
+        suspects: items at which a worker was lost, together, with the number of workers lost at
+            an item alone.
         sent: number of chunks held by workers.
         failed: whether the job is given up.
         deliveries: number of deliveries of the bundle by the worker's address.
@@ -105,7 +107,7 @@ class ClusterJob(ABC):
         self.what, self.bundle = what, bundle
         self._fresh, self._fresh_count = iter(items), len(items)
         self.returned: deque[Any] = deque()
-        self.suspects: deque[tuple[Any, int]] = deque()
+        self.suspects: deque[tuple[tuple[Any, ...], int]] = deque()
         self.sent = 0
         self.failed = False
         self.deliveries: Counter[str] = Counter()
@@ -129,7 +131,11 @@ class ClusterJob(ABC):
     @property
     def unsent_count(self) -> int:
         """Number of items that no worker has."""
-        return self._fresh_count + len(self.returned) + len(self.suspects)
+        return (
+            self._fresh_count
+            + len(self.returned)
+            + sum(len(items) for items, _ in self.suspects)
+        )
 
     def take_chunk(self, places: int) -> SentChunk:
         """Takes items for the next chunk; chunks shrink towards the end of the work.
@@ -138,8 +144,7 @@ class ClusterJob(ABC):
             places: number of chunks among which the remaining items could be divided.
         """
         if self.suspects:
-            item, losses = self.suspects.popleft()
-            return SentChunk(self, (item,), losses)
+            return SentChunk(self, *self.suspects.popleft())
         size = min(self.max_items, -(-self.unsent_count // places))
         again = [self.returned.popleft() for _ in range(min(size, len(self.returned)))]
         fresh = list(islice(self._fresh, size - len(again)))
@@ -151,7 +156,7 @@ class ClusterJob(ABC):
         if self.failed:
             return
         if chunk.losses:
-            self.suspects.appendleft((chunk.items[0], chunk.losses))
+            self.suspects.appendleft((chunk.items, chunk.losses))
         else:
             self.returned.extendleft(reversed(chunk.items))
 
@@ -161,8 +166,8 @@ class ClusterJob(ABC):
         items: Sequence[Any] | None = None,
         what: str = "were lost while working on it",
     ) -> Iterator[Any]:
-        """Takes back items that a lost worker had or left out. Each is sent alone next time, as it
-        may be the cause.
+        """Takes back items that a lost worker had or left out. As one of them may be the cause,
+        each is sent alone next time, or each half of them where workers take many.
 
         Args:
             chunk: the worker's chunk.
@@ -174,9 +179,13 @@ class ClusterJob(ABC):
         """
         if self.failed:
             return
-        items, losses = chunk.items if items is None else items, chunk.losses + 1
+        items, losses = tuple(chunk.items if items is None else items), chunk.losses + 1
+        if self.max_items > ChunkSettings.max_grasps and len(items) > 1:
+            half = len(items) // 2
+            self.suspects.extend(((items[:half], 0), (items[half:], 0)))
+            return
         if losses < ChunkSettings.max_losses:
-            self.suspects.extend((item, losses) for item in items)
+            self.suspects.extend(((item,), losses) for item in items)
             return
         error = SimulationError(f"{losses} workers of the cluster {what}, one after the other")
         for item in items:
@@ -198,7 +207,6 @@ class GraspJob(ClusterJob):
         crashes_in_a_row: grasps that crashed their child process since the last verdict.
     """
 
-    max_items = ChunkSettings.max_grasps
     result_timeout = 3.0  # Seconds; the worker may be lost by now.
 
     def __init__(self, job: Job, limits: WorkerLimits, on_failure: OnFailure | None) -> None:
@@ -212,6 +220,11 @@ class GraspJob(ClusterJob):
         self.job = job
         self.crashes_in_a_row = 0
         self._limits, self._on_failure = limits, on_failure
+        self.max_items = ChunkSettings.max_grasps
+        make = job.make_judge
+        if isinstance(make, StationJudgeFactory) and make.engine.parallel:
+            self.max_items = ChunkSettings.max_parallel_grasps
+            self.result_timeout = ClusterJob.result_timeout
 
     def task(self, run: str, items: Sequence[Candidate]) -> GraspChunk:
         """See `ClusterJob.task`."""
