@@ -31,7 +31,7 @@ from burg_drake.evaluation.campaign_folder import Campaign, is_campaign
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
-from burg_drake.evaluation.judge import require_device
+from burg_drake.evaluation.judge import require_device, starting_note
 from burg_drake.evaluation.many_scenes import evaluate_scenes
 from burg_drake.evaluation.part_store import keep_parts
 from burg_drake.evaluation.run_document import add_session, begin_session
@@ -224,9 +224,9 @@ def _judge_open_grasps(
     total = len(run.assigned_ids)
     done = total - len(left)
     outcomes = run.index.count_outcomes(left)
-    meter = ProgressMeter(
-        reporter.show, Progress(STARTING_PHASE, done, total, outcomes=outcomes), "judging"
-    )
+    note = starting_note(run.document.engine, local=isinstance(executor, LocalExecutor))
+    event = Progress(STARTING_PHASE, done, total, outcomes=outcomes, note=note)
+    meter = ProgressMeter(reporter.show, event, "judging")
     session = begin_session(executor.workers, int(run.index.judged.sum()))
     document = run.document
     save_run(run.with_document(add_session(document, session)))

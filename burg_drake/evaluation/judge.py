@@ -111,6 +111,18 @@ def require_device(engine: Engine, device: str | None) -> None:
         ).about("device", "engine")
 
 
+def starting_note(engine: Engine, *, local: bool) -> str:
+    """What takes long before the first verdict, if anything does, for a line of progress."""
+    if not (engine.parallel and local):
+        return ""
+    from burg_drake.simulation import find_devices, kernels_are_compiled
+
+    find_devices("cpu")  # initialises Warp, and is always there
+    if kernels_are_compiled():
+        return ""
+    return "compiling kernels, which takes two or three minutes, once"
+
+
 def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
     """Refuses objects and hands that an engine cannot simulate.
 

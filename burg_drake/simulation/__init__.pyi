@@ -3,6 +3,7 @@ from .batch.batch_trial import BatchTrial as BatchTrial
 from .batch.warp_device import (
     describe_devices as describe_devices,
     find_devices as find_devices,
+    kernels_are_compiled as kernels_are_compiled,
     require_warp as require_warp,
 )
 from .contacts import (

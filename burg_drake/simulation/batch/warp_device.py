@@ -76,6 +76,15 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
     return cards if name is None else [known[name]]
 
 
+def kernels_are_compiled() -> bool:
+    """Whether kernels of trials are in Warp's cache; others may still have to be compiled, as some
+    depend on the number of joints."""
+    import warp as wp
+
+    folder = wp.config.kernel_cache_dir  # set by `find_devices`
+    return folder is not None and any(Path(folder).glob("*trial_kernels*"))
+
+
 @contextmanager
 def _without_stderr() -> Iterator[None]:
     """Discards what libraries write to standard error meanwhile."""
