@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Literal, get_args
 
@@ -392,9 +392,7 @@ class ObjectLibrary:
             MeshError: the mesh file is damaged.
         """
         entry = self.entry(name)
-        mesh = self.mesh(entry.surface or entry.mesh)
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
-        return mesh
+        return self._read(entry.surface or entry.mesh, merge=True)
 
     def mesh(self, relative: str) -> trimesh.Trimesh:
         """A mesh file of the library, such as a convex piece, unchanged but without colours [m].
@@ -403,18 +401,17 @@ class ObjectLibrary:
             UnknownNameError: the file is missing.
             MeshError: the file is damaged.
         """
-        import trimesh
+        return self._read(relative, merge=False)
 
+    def _read(self, relative: str, *, merge: bool) -> trimesh.Trimesh:
+        """A mesh file, with vertices at the same place merged if asked for."""
         path = self.path(relative)
+        state = path.stat()
         try:
-            mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
-            # Fails if faces refer to missing vertices.
-            corners = np.asarray(mesh.vertices)[mesh.faces]
+            found = _read_mesh(path, state.st_mtime_ns, state.st_size, merge=merge)
         except Exception as error:  # the reader raises errors of any type
             raise self.damaged(path) from error
-        if not len(corners) or not np.isfinite(corners).all():
-            raise self.damaged(path)
-        return mesh
+        return found.copy(include_cache=True)
 
     def damaged(self, path: Path) -> MeshError:
         """The error for a damaged mesh file."""
@@ -440,6 +437,30 @@ class ObjectLibrary:
         if not manifest.is_file() or manifest.read_text() != package:
             atomic_write(manifest, package)
         save_document(self.document, self.root / LIBRARY_FILE)
+
+
+@lru_cache(maxsize=64)
+def _read_mesh(path: Path, modified: int, size: int, *, merge: bool) -> trimesh.Trimesh:
+    """Reads a mesh file; files are read again once they have changed.
+
+    Args:
+        path: the file.
+        modified, size: time of its last change, and its size.
+        merge: whether to merge vertices at the same place.
+
+    Raises:
+        Exception: errors of any type by the reader; the file has no faces, or one beyond its
+            vertices, or a vertex is not finite.
+    """
+    import trimesh
+
+    mesh = trimesh.load(path, force="mesh", process=False, skip_materials=True)
+    corners = np.asarray(mesh.vertices)[mesh.faces]
+    if not len(corners) or not np.isfinite(corners).all():
+        raise ValueError(f"{path} has no faces, or vertices that are not finite")
+    if merge:
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    return mesh
 
 
 def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibrary:

@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, BurgError, GraspSet, Outcome, inverse, make_pose, rot_z
+from burg_drake.core import (
+    Array,
+    BurgError,
+    GraspSet,
+    Outcome,
+    content_hash,
+    inverse,
+    make_pose,
+    rot_z,
+)
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.grasp_sets.given_grasps import Owners, held_instances
 from burg_drake.evaluation.grasp_sets.input import split_by_instance
@@ -290,7 +299,7 @@ def width_ratios(
     """
     from burg_drake.grasping import grasp_contacts
 
-    test, ratios = _FitTest(station, source), [np.empty(0)]
+    test, ratios = _fit_test(station, source), [np.empty(0)]
     for name, part in grasps.items():
         known = np.flatnonzero(part.width > 0.0)[: MistakeLimits.max_grasps]
         contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
@@ -315,7 +324,7 @@ class _MistakeSearch:
         self._frames = frames
         self._gripper = gripper = station_gripper(station)
         self._scene = source if isinstance(source, Scene) else None
-        self._test = _FitTest(station, source)
+        self._test = _fit_test(station, source)
         first = next(iter(grasps.values()))
         how = first.provenance
         X_SM = how.get("X_SM")
@@ -581,6 +590,21 @@ class _FitTest:
         if object not in self._surfaces:
             self._surfaces[object] = Surface.of(self._library.surface(object))
         return self._surfaces[object]
+
+
+_KEPT_TESTS: dict[str, _FitTest] = {}
+"""The last tests by station and source: a command asks about the same scene several times."""
+
+
+def _fit_test(station: Station, source: Scene | ObjectLibrary) -> _FitTest:
+    """The test for a station and a source, built once while the same ones are asked for."""
+    max_kept = 2
+    key = content_hash(station.content, source.content)
+    if key not in _KEPT_TESTS:
+        while len(_KEPT_TESTS) >= max_kept:
+            del _KEPT_TESTS[next(iter(_KEPT_TESTS))]
+        _KEPT_TESTS[key] = _FitTest(station, source)
+    return _KEPT_TESTS[key]
 
 
 def _choose_mistake(
