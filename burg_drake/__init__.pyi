@@ -33,7 +33,6 @@ from .evaluation import (
     Run as Run,
     SamplingSettings as SamplingSettings,
     evaluate as evaluate,
-    label_library as label_library,
     load_campaign as load_campaign,
     load_run as load_run,
     reach as reach,

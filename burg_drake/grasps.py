@@ -5,7 +5,9 @@ from burg_drake.evaluation import (
     GivenGrasps as GivenGrasps,
     Mistake as Mistake,
     MistakeFound as MistakeFound,
+    ObjectLabels as ObjectLabels,
     find_mistake as find_mistake,
+    label_library as label_library,
     read_grasps as read_grasps,
     scored_set as scored_set,
 )

@@ -69,7 +69,7 @@ class Margins:
         "m",
         "how far the target's centre of mass rose; with another motion how far it moved"
         " along the straight segments. If the trial was decided early, the rest of the"
-        " path counts, too, as geometry shows that it is free",
+        " path counts, too, as geometry shows that it is free. nan if the hand was shaken",
         digits=0,
     )
     lift_height: float = margin_field(

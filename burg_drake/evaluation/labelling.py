@@ -61,12 +61,10 @@ def label_library(
     out: str | Path,
     *,
     format: str = "burg_drake",
-    only: Iterable[str] | None = None,
     grasps: GraspSet | None = None,
     settings: EvaluationSettings | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
-    retry_failed: bool = False,
     progress: bool | Listener = True,
 ) -> Iterator[ObjectLabels]:
     """Labels grasps of the objects of a library, object by object.
@@ -79,19 +77,17 @@ def label_library(
     Example::
 
         library = burg.load_library("household")
-        settings = burg.EvaluationSettings(grasps_per_object=2000, engine="mujoco")
-        for labelled in burg.label_library(library, "panda_tabletop", "labels", settings=settings):
-            print(labelled.object, labelled.success.mean())
+        for labels in burg.grasps.label_library(library, "panda_tabletop", "labels"):
+            print(labels.object, labels.success.mean(), labels.path)
 
     Args:
         library: the objects.
         station: table and hand.
         out: folder for the files of grasps, and for scenes and runs.
         format: format of the files, see `formats.GRASP_FORMATS`; each holds one object.
-        only: names of objects; all that are not fixed if None.
         grasps: grasps in object frames, to be labelled in place of sampled ones.
-        settings: settings of the runs; their mode is `hand`.
-        executor, workers, retry_failed, progress: see `evaluate`.
+        settings: settings of the runs, whose mode is `hand`; `only` has names of objects.
+        executor, workers, progress: see `evaluate`.
 
     Yields:
         The grasps of each object, once its file is written.
@@ -101,7 +97,7 @@ def label_library(
         UnknownNameError: there is no such object or format.
     """
     settings, station, folder = settings or EvaluationSettings(), as_station(station), Path(out)
-    names, target = _chosen_objects(library, only, grasps), format_named(format)
+    names, target = _chosen_objects(library, settings.only, grasps), format_named(format)
     if target.frame != "object":
         raise InvalidInputError(
             f"{target.title} has grasps in the {target.frame} frame, but those of objects are"
@@ -127,7 +123,6 @@ def label_library(
             settings=settings,
             executor=executor,
             workers=workers,
-            retry_failed=retry_failed,
             progress=progress,
         )
         found = run_grasps(run)

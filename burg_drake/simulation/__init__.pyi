@@ -54,7 +54,11 @@ from .mujoco_world import (
     MujocoWorld as MujocoWorld,
     require_mujoco as require_mujoco,
 )
-from .object_motions import GripMotion as GripMotion, MotionTracker as MotionTracker
+from .object_motions import (
+    GripMotion as GripMotion,
+    MotionTracker as MotionTracker,
+    MovingBody as MovingBody,
+)
 from .perturbation import (
     PerturbedTrial as PerturbedTrial,
     SuccessRate as SuccessRate,

@@ -118,9 +118,9 @@ def test_shaken_objects_are_alone_in_the_air_and_weigh_nothing(
     """So the pads hold what is ten times too heavy to be lifted, if it is hardly shaken."""
     scene = scene_of_one(library, "heavy", station, "shake")
     assert scene.X_SO("heavy")[2, 3] > height_to_shake(station)
-    settings = replace(SETTINGS, protocol="shake", grasps_per_object=2)
+    settings = replace(SETTINGS, protocol="shake", grasps_per_object=2, only=("cube",))
     (found,) = label_library(
-        library, station, tmp_path, only=["cube"], settings=settings, workers=1, progress=False
+        library, station, tmp_path, settings=settings, workers=1, progress=False
     )
     run = load_run(found.run.path)
     assert run.document.trial["shake_periods"] == 2
@@ -137,9 +137,9 @@ def test_what_cannot_be_labelled_is_refused(
         next(label_library(library, station, tmp_path / "out", progress=False, **more))
 
     with pytest.raises(InvalidInputError, match="has no mass"):
-        label(only=["wall"])
+        label(settings=EvaluationSettings(only="wall"))
     with pytest.raises(UnknownNameError, match=r"no object 'cub'.*cube"):
-        label(only=["cub"])
+        label(settings=EvaluationSettings(only="cub"))
     with pytest.raises(InvalidInputError, match="in the camera frame"):
         label(format="graspnet")
     assert not (tmp_path / "out").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -45,7 +46,6 @@ def add_grasps_label_options(parser: options.Parser) -> None:
     workers_group = parser.add_mutually_exclusive_group()
     options.add_workers(workers_group)
     options.add_cluster(workers_group)
-    options.add_retry_failed(parser, "grasps")
     options.add_quiet(parser)
 
 
@@ -60,6 +60,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
         arguments,
         evaluation.EvaluationSettings,
         grasps_per_object=options.grasps_per_object(arguments),
+        only=arguments.only,
     )
     grasps = _given_grasps(arguments)
     labelled = []
@@ -69,12 +70,10 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             station,
             arguments.output,
             format=arguments.target or "burg_drake",
-            only=arguments.only,
             grasps=grasps,
             settings=settings,
             executor=executor,
             workers=arguments.workers,
-            retry_failed=arguments.retry_failed,
             progress=not arguments.quiet,
         ):
             print(f"wrote {len(found.success)} labelled grasps to {found.path}")
@@ -83,10 +82,9 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     print_note_lines(dict.fromkeys(note for found in labelled for note in found.notes))
     failures = sum(len(found.run.failures) for found in labelled)
     if failures:
-        interrupted = sum(len(found.run.interrupted) for found in labelled)
         print_remark(
-            f"{failures} grasps could not be simulated and have no label;"
-            f" {options.retry_advice(interrupted, failures)}"
+            f"{failures} grasps could not be simulated and have no label; the tables of results"
+            f" below {Path(arguments.output) / 'runs'} have the reasons"
         )
     return 1 if failures else 0
 

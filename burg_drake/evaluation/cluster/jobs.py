@@ -132,9 +132,7 @@ class ClusterJob(ABC):
     def unsent_count(self) -> int:
         """Number of items that no worker has."""
         return (
-            self._fresh_count
-            + len(self.returned)
-            + sum(len(items) for items, _ in self.suspects)
+            self._fresh_count + len(self.returned) + sum(len(items) for items, _ in self.suspects)
         )
 
     def take_chunk(self, places: int) -> SentChunk:
