@@ -360,4 +360,5 @@ from .trial_origin import (
     read_motion as read_motion,
     read_origin as read_origin,
     read_trial_settings as read_trial_settings,
+    require_lifts as require_lifts,
 )

@@ -51,7 +51,7 @@ from burg_drake.evaluation.settings import (
     RobustnessSettings,
 )
 from burg_drake.evaluation.table_file import require_table, write_table
-from burg_drake.evaluation.trial_origin import engine_label, pairs_text
+from burg_drake.evaluation.trial_origin import engine_label, pairs_text, require_lifts
 from burg_drake.simulation import SHAKE_AXES, TUG_DIRECTIONS, HoldForces, SuccessRate
 from burg_drake.station import Engine
 
@@ -375,6 +375,7 @@ def _tests_by_grasp(
 ) -> dict[str, _EngineTests]:
     """Tests by id of the grasp; grasps judged by the same engine share one object."""
     scene, station, origin = run.scene(), run.station(), origin_of(run.document)
+    require_lifts(origin.trial, run.path, "robustness tests are about")
     trial = origin.settings(f"{run.path / RUN_FILE}: trial")
     loaded = [test for test in settings.tests if test in LOADED_TESTS]
     by_judge: dict[str, _EngineTests] = {}

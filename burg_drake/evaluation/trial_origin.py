@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from burg_drake.core import (
@@ -47,6 +48,24 @@ def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
 def protocol_of(values: Mapping[str, float]) -> TrialProtocol:
     """Protocol of trials with recorded settings."""
     return "shake" if "shake_periods" in values else "lift"
+
+
+def require_lifts(values: Mapping[str, float], where: Path, what: str) -> None:
+    """Refuses a run whose objects were shaken, alone in the air.
+
+    Args:
+        values: recorded settings of the trials.
+        where: folder of the run.
+        what: what needs lifts, for the message.
+
+    Raises:
+        InvalidInputError: the protocol is not `lift`.
+    """
+    if protocol_of(values) != "lift":
+        raise InvalidInputError(
+            f"{where}: its objects were shaken, alone and without gravity, but {what} those that"
+            " are lifted off a table; give a run with protocol lift"
+        )
 
 
 def measure_text(values: Mapping[str, float]) -> str:

@@ -13,11 +13,13 @@ from burg_drake.core import InvalidInputError, Outcome, UnknownNameError
 from burg_drake.evaluation import (
     EvaluationSettings,
     ObjectLabels,
+    assess_robustness,
     evaluate,
     label_library,
     load_run,
     scene_of_one,
 )
+from burg_drake.experiment import plan_trials
 from burg_drake.formats import LABELLED_BY, read_grasp_file, success_labels
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.pipeline import ObjectSource, build_library
@@ -128,6 +130,20 @@ def test_shaken_objects_are_alone_in_the_air_and_weigh_nothing(
     assert "tilt_limit" not in run.document.trial or run.document.trial["tilt_limit"] >= np.pi
     assert set(run.results["outcome"].tolist()) == {Outcome.LIFTED.value}
     assert np.isnan(run.results["lift"]).all() and np.isnan(run.results["confidence"]).all()
+
+
+def test_shaken_objects_are_not_those_of_a_robot(
+    library: ObjectLibrary, station: Station, judged_here: None, tmp_path: Path
+) -> None:
+    """They are in the air, so neither robustness tests nor trials on a robot are about them."""
+    settings = replace(SETTINGS, protocol="shake", grasps_per_object=1, only=("cube",))
+    (found,) = label_library(
+        library, station, tmp_path, settings=settings, workers=1, progress=False
+    )
+    with pytest.raises(InvalidInputError, match="its objects were shaken"):
+        assess_robustness(found.run, progress=False)
+    with pytest.raises(InvalidInputError, match="its objects were shaken"):
+        plan_trials(found.run)
 
 
 def test_what_cannot_be_labelled_is_refused(

@@ -26,7 +26,7 @@ from burg_drake.core import (
     software_versions,
     suggest_names,
 )
-from burg_drake.evaluation import Campaign, Run
+from burg_drake.evaluation import Campaign, Run, require_lifts
 from burg_drake.experiment.trials.grasp_selection import (
     Chosen,
     EligibleGrasps,
@@ -180,6 +180,8 @@ def plan_trials(
     gathered = gather_runs(given)
     if robustness is not None and len(gathered) > 1:
         raise InvalidInputError("a table of robustness belongs to one run; give that run alone")
+    for run in gathered.values():
+        require_lifts(run.document.trial, run.path, "a robot tries")
     pools, notes = list_eligible_grasps(gathered, selection.among)
     pools = draw_scenes(pools, selection)
     table = None if robustness is None else Path(robustness)
