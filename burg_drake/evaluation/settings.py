@@ -298,8 +298,8 @@ class EvaluationSettings:
     motion: GraspMotion | None = None
     protocol: TrialProtocol = setting(
         "lift",
-        "with the hand alone, lift: lift the object off the table; shake: shake it, without"
-        " gravity, in a scene where it is alone in the air",
+        "with the hand alone, lift: lift the object off the table; shake: shake it alone in the"
+        " air, without gravity",
         choices=TRIAL_PROTOCOLS,
     )
     seed: int = setting(0, "random seed of the sampling", high=MAX_DOCUMENT_SEED)

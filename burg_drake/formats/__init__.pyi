@@ -21,6 +21,7 @@ from .grasp_conversion import (
     write_each_object as write_each_object,
 )
 from .grasp_files import (
+    BURG_DRAKE_FORMAT as BURG_DRAKE_FORMAT,
     GRASP_FORMATS as GRASP_FORMATS,
     format_by_suffix as format_by_suffix,
     format_named as format_named,

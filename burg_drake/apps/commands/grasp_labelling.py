@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake import core, evaluation
+from burg_drake import core, evaluation, formats
 from burg_drake.apps import options
 from burg_drake.apps.terminal import print_note_lines, print_remark
 
@@ -26,7 +26,7 @@ def add_grasps_label_options(parser: options.Parser) -> None:
     parser.set_defaults(after_interrupt="; run the same command to continue")
     parser.add_argument("library", metavar="LIBRARY", help="library folder, or built-in name")
     options.add_output(parser, "FOLDER", "folder for a file of grasps per object, scenes and runs")
-    options.add_format_option(parser)
+    options.add_format_option(parser, formats.BURG_DRAKE_FORMAT.name)
     source_group = parser.add_mutually_exclusive_group()
     options.add_sampling_options(parser, 100, source_group)
     source_group.add_argument(
@@ -41,7 +41,10 @@ def add_grasps_label_options(parser: options.Parser) -> None:
     options.add_settings_options(
         parser,
         evaluation.EvaluationSettings,
-        *("protocol", "engine", "device", "tilt_limit_deg", "slip_limit_mm"),
+        *("protocol", "engine", "device"),
+    )
+    options.add_settings_options(
+        parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", unset=True
     )
     workers_group = parser.add_mutually_exclusive_group()
     options.add_workers(workers_group)
@@ -55,6 +58,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     from burg_drake.station import load_station
 
     options.refuse_sampling_options_with_file(arguments)
+    _refuse_limits_of_shaking(arguments)
     library, station = load_library(arguments.library), load_station(arguments.station)
     settings = options.settings_from(
         arguments,
@@ -69,7 +73,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             library,
             station,
             arguments.output,
-            format=arguments.target or "burg_drake",
+            format=arguments.target or formats.BURG_DRAKE_FORMAT.name,
             grasps=grasps,
             settings=settings,
             executor=executor,
@@ -87,6 +91,16 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             f" below {Path(arguments.output) / 'runs'} have the reasons"
         )
     return 1 if failures else 0
+
+
+def _refuse_limits_of_shaking(arguments: argparse.Namespace) -> None:
+    """Refuses options that have no effect where the hand is shaken."""
+    for name in ("approach_angle", "tilt_limit", "slip_limit_mm"):
+        if arguments.protocol == "shake" and getattr(arguments, name) is not None:
+            raise core.InvalidInputError(
+                f"{arguments.flags[name]} has no effect with --protocol shake, for which grasps come"
+                " from all sides, and an object may move in the hand; leave it out"
+            )
 
 
 def _given_grasps(arguments: argparse.Namespace) -> core.GraspSet | None:

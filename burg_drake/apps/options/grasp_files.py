@@ -308,10 +308,10 @@ class GraspOutput:
             print_notes([f"{where}{note}"])
 
 
-def add_format_option(parser: Parser) -> None:
-    """Adds the option --to."""
+def add_format_option(parser: Parser, default: str = "by the suffix") -> None:
+    """Adds the option --to; the help names the default."""
     parser.add_argument(
-        "--to", dest="target", metavar="FORMAT", help="format to write (default: by the suffix)"
+        "--to", dest="target", metavar="FORMAT", help=f"format to write (default: {default})"
     )
 
 

@@ -1,0 +1,68 @@
+"""`grasps label`: what it writes and prints, given grasps, replay, and what it refuses."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.apps import main
+from burg_drake.core import GraspSet
+from burg_drake.evaluation import load_run
+from burg_drake.formats import read_grasp_file, success_labels
+
+Capture = pytest.CaptureFixture[str]
+QUICK = ["--workers", "1", "--quiet"]
+
+
+def label(*more: str) -> int:
+    return main(["grasps", "label", "household", "--only", "box", *more, *QUICK])
+
+
+def test_writes_labels_and_prints_them_by_object(tmp_path: Path, capsys: Capture) -> None:
+    arguments = ["-n", "3", "--engine", "screening", "--to", "acronym", "-o", str(tmp_path)]
+    assert label(*arguments) == 0
+    out = capsys.readouterr().out
+    labels = success_labels(read_grasp_file(tmp_path / "box.h5", "acronym").grasps)
+    assert len(labels) == 3
+    assert f"wrote 3 labelled grasps to {tmp_path / 'box.h5'}" in out
+    (row,) = (line.split() for line in out.splitlines() if line.startswith("box "))
+    assert row[:3] == ["box", "3", f"{int(labels.sum())}"]
+    assert out.count("has no place for") == 1
+
+
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shaken")
+    arguments = ["--protocol", "shake", "--engine", "screening", "-n", "2", "-o", str(folder)]
+    assert label(*arguments) == 0
+    return folder
+
+
+def test_shaken_grasps_are_replayed_and_can_be_made_again(shaken: Path, capsys: Capture) -> None:
+    run = load_run(shaken / "runs" / "box")
+    assert main(["replay", str(run.path), "--grasp", run.candidates[0].id, "--no-wait"]) == 0
+    out = capsys.readouterr().out
+    assert "shaken 2 times along the approach" in out
+    words = re.sub(r"<[^>]+>", " ", (run.path / "report.html").read_text()).split()
+    assert words[words.index("--protocol") + 1] == "shake"
+
+
+def test_labels_of_others_are_compared(shaken: Path, tmp_path: Path, capsys: Capture) -> None:
+    grasps = read_grasp_file(shaken / "box.h5").grasps
+    theirs = str(tmp_path / "theirs.h5")
+    GraspSet.create(grasps.X_OG, object="theirs", score=np.array([0.0, 1.0])).save(theirs)
+    more = ["--rename", "box", "--protocol", "shake", "--engine", "screening"]
+    assert label("--grasps", theirs, *more, "-o", str(tmp_path / "again")) == 0
+    assert "50.0 % of 2" in capsys.readouterr().out
+
+
+def test_what_has_no_effect_is_refused(tmp_path: Path, capsys: Capture) -> None:
+    for more in (["--tilt-limit", "10"], ["--approach-angle", "30"]):
+        assert label("--protocol", "shake", *more, "-o", str(tmp_path / "out")) == 2
+        assert f"{more[0]} has no effect with --protocol shake" in capsys.readouterr().err
+    assert label("--to", "graspnet", "-o", str(tmp_path / "out")) == 2
+    assert "in the camera frame" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
