@@ -98,8 +98,8 @@ def _refuse_limits_of_shaking(arguments: argparse.Namespace) -> None:
     for name in ("approach_angle", "tilt_limit", "slip_limit_mm"):
         if arguments.protocol == "shake" and getattr(arguments, name) is not None:
             raise core.InvalidInputError(
-                f"{arguments.flags[name]} has no effect with --protocol shake, for which grasps come"
-                " from all sides, and an object may move in the hand; leave it out"
+                f"{arguments.flags[name]} has no effect with --protocol shake: grasps come from all"
+                " sides, and an object may move in the hand; leave it out"
             )
 
 
