@@ -260,4 +260,5 @@ def _outcome_text(event: Progress) -> str:
         return event.note
     failed = event.outcomes[Outcome.SIMULATION_FAILED]
     found = f"{event.outcomes[event.counted_outcome]:,} {event.counted_outcome}"
-    return found + (f", {failed} failed" if failed else "")
+    found += f", {failed} failed" if failed else ""
+    return f"{found}  {event.note}" if event.phase == STARTING_PHASE and event.note else found

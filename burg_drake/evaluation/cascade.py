@@ -182,12 +182,11 @@ def _evaluate_one(
     progress: bool | Listener,
 ) -> Run:
     scene = as_scene(scene)
-    station, mode = request.station, request.mode
     request.describe_grasps(scene)
     given = request.given_candidates(scene)  # refuses unfit grasps before the folder is made
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
-        require_sound(scene, station, mode, request.engine)
+        require_sound(scene, request)
     ensure_writable_folder(folder)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
@@ -198,7 +197,9 @@ def _evaluate_one(
             left = open_rows(run, retry_failed=retry_failed)
             if len(left):
                 job = Job(scene.name, make_judge, run.candidates.at(left))
-                run = _judge_open_grasps(run, left, job, journal, executor, reporter)
+                local = isinstance(executor, LocalExecutor)
+                note = starting_note(run.document.engine, request.settings.device) if local else ""
+                run = _judge_open_grasps(run, left, job, journal, executor, reporter, note)
                 require_judged(run)
                 hints = given_hints(run)
                 run = save_run(run.with_document(replace(run.document, hints=hints)))
@@ -206,7 +207,7 @@ def _evaluate_one(
             if more is None:
                 break
             reporter.show(Progress("sampling"))
-            run, retry_failed = resample_run(run, more, scene, station, before=run), False
+            run, retry_failed = resample_run(run, more, scene, request.station, before=run), False
         run = finish_run(run, request.settings.table)
         keep_parts(run)
         return run
@@ -219,12 +220,12 @@ def _judge_open_grasps(
     journal: Journal,
     executor: Executor,
     reporter: Reporter,
+    note: str,
 ) -> Run:
     """Judges the open grasps, writes each verdict at once, and returns the updated run."""
     total = len(run.assigned_ids)
     done = total - len(left)
     outcomes = run.index.count_outcomes(left)
-    note = starting_note(run.document.engine, local=isinstance(executor, LocalExecutor))
     event = Progress(STARTING_PHASE, done, total, outcomes=outcomes, note=note)
     meter = ProgressMeter(reporter.show, event, "judging")
     session = begin_session(executor.workers, int(run.index.judged.sum()))

@@ -111,14 +111,18 @@ def require_device(engine: Engine, device: str | None) -> None:
         ).about("device", "engine")
 
 
-def starting_note(engine: Engine, *, local: bool) -> str:
-    """What takes long before the first verdict, if anything does, for a line of progress."""
-    if not (engine.parallel and local):
+def starting_note(engine: Engine, device: str | None) -> str:
+    """Note for the line of progress if kernels have to be compiled first; empty otherwise.
+
+    Args:
+        engine: engine of the run.
+        device: see `EvaluationSettings`.
+    """
+    if not engine.parallel:
         return ""
     from burg_drake.simulation import find_devices, kernels_are_compiled
 
-    find_devices("cpu")  # initialises Warp, and is always there
-    if kernels_are_compiled():
+    if kernels_are_compiled(find_devices(device)[0]):
         return ""
     return "compiling kernels, which takes two or three minutes, once"
 

@@ -10,49 +10,57 @@ import numpy as np
 
 from burg_drake.core import (
     Array,
+    BurgError,
     GraspSet,
     InvalidInputError,
     Listener,
     Pose,
     UnknownNameError,
     ensure_writable_folder,
+    inverse,
     make_pose,
+    portable_reference,
     suggest_names,
 )
+from burg_drake.evaluation.candidates import without_instance
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.executor import Executor
 from burg_drake.evaluation.grasp_sets.input import run_grasps
-from burg_drake.evaluation.run_folder import Run
+from burg_drake.evaluation.judge import require_device
+from burg_drake.evaluation.run_folder import RUN_FILE, Run
+from burg_drake.evaluation.run_preparation import RunRequest
 from burg_drake.evaluation.settings import EvaluationSettings
-from burg_drake.formats import format_named, success_labels, write_each_object
+from burg_drake.formats import format_named, success_labels
 from burg_drake.objects import ObjectLibrary
 from burg_drake.scene import Board, Instance, Scene, SceneDocument, place_objects, save_scene
 from burg_drake.simulation import TrialProtocol, height_to_shake
-from burg_drake.station import Station, StationLike, as_station, station_gripper
+from burg_drake.station import Station, StationLike, as_engine, as_station, station_gripper
 
 LABELLING_SCENES_FOLDER, LABELLING_RUNS_FOLDER = "scenes", "runs"
 """Folders beside the labelled grasps: the scene of each object, and its run."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ObjectLabels:
-    """Labelled grasps of one object.
+    """Labels of the grasps of one object.
 
     Attributes:
         object: name of the object.
-        run: the run that labelled them.
+        run: the run that labelled them; None if the object cannot be evaluated.
         success: (N,) 1 if a grasp holds, 0 if not, NaN if it could not be simulated.
         given: (N,) labels that the grasps came with; NaN where there are none.
-        path: file of the grasps.
+        path: file of the grasps; None if there are none.
         notes: what the file cannot carry, one sentence each.
+        error: why the object cannot be evaluated; empty if it was.
     """
 
     object: str
-    run: Run
+    run: Run | None = None
     success: Array
     given: Array
-    path: Path
-    notes: tuple[str, ...]
+    path: Path | None = None
+    notes: tuple[str, ...] = ()
+    error: str = ""
 
 
 def label_library(
@@ -69,10 +77,11 @@ def label_library(
 ) -> Iterator[ObjectLabels]:
     """Labels grasps of the objects of a library, object by object.
 
-    Each object stands alone on the table, as its mesh stands, or with protocol `shake` is alone in
-    the air. Each gets a run of its own, with all outcomes and margins, and a file of its grasps; a
-    call on the same folder goes on where an earlier one stopped. With protocol `shake` grasps come
-    from all sides, and no limit on motion in the hand applies, as in ACRONYM.
+    Each object stands alone on the table, or with protocol `shake` is alone in the air. Each gets a
+    run of its own, with all outcomes and margins, and a file of its grasps; a call on the same
+    folder goes on where an earlier one stopped. With protocol `shake` grasps come from all sides,
+    and no limit on motion in the hand applies, as in ACRONYM. An object that cannot be evaluated
+    does not stop the others.
 
     Example::
 
@@ -86,15 +95,16 @@ def label_library(
         out: folder for the files of grasps, and for scenes and runs.
         format: format of the files, see `formats.GRASP_FORMATS`; each holds one object.
         grasps: grasps in object frames, to be labelled in place of sampled ones.
-        settings: settings of the runs, whose mode is `hand`; `only` has names of objects.
+        settings: settings of the runs, in mode `hand`; `only` has names of objects.
         executor, workers, progress: see `evaluate`.
 
     Yields:
-        The grasps of each object, once its file is written.
+        The labels of each object, once its file is written.
 
     Raises:
-        InvalidInputError: a bad argument, an object that cannot stand, or see `evaluate`.
+        InvalidInputError: a bad argument, a setting that has no effect, or no object to label.
         UnknownNameError: there is no such object or format.
+        MissingDependencyError: the engine is not installed.
     """
     settings, station, folder = settings or EvaluationSettings(), as_station(station), Path(out)
     names, target = _chosen_objects(library, settings.only, grasps), format_named(format)
@@ -103,83 +113,124 @@ def label_library(
             f"{target.title} has grasps in the {target.frame} frame, but those of objects are"
             " labelled; give a format with the frame of objects"
         ).about("format")
-    settings = replace(settings, mode="hand", only=None)
-    if settings.protocol == "shake":
-        settings = replace(
-            settings, approach_angle_deg=180.0, tilt_limit_deg=180.0, slip_limit_mm=np.inf
-        )
-    scenes = {name: scene_of_one(library, name, station, settings.protocol) for name in names}
+    settings = _labelling_settings(settings)
+    RunRequest.of(station, settings)
+    if executor is None:
+        require_device(as_engine(settings.engine), settings.device)
     ensure_writable_folder(folder)
-    for name, scene in scenes.items():
-        path = folder / LABELLING_SCENES_FOLDER / f"{scene.name}.yaml"
-        if not path.exists():
-            ensure_writable_folder(path.parent)
-            save_scene(scene.document, path)
-        run = evaluate(
-            place_objects(scene.document, library, path),
-            station,
-            folder / LABELLING_RUNS_FOLDER / scene.name,
-            grasps=None if grasps is None else grasps.select(grasps.object == name),
-            settings=settings,
-            executor=executor,
-            workers=workers,
-            progress=progress,
+    for name in names:
+        run_folder = folder / LABELLING_RUNS_FOLDER / name
+        path = folder / LABELLING_SCENES_FOLDER / f"{name}.yaml"
+        try:
+            scene = single_object_scene(library, name, station, settings.protocol, path)
+            if not (run_folder / RUN_FILE).exists():
+                ensure_writable_folder(path.parent)
+                save_scene(scene.document, path)
+            run = evaluate(
+                scene,
+                station,
+                run_folder,
+                grasps=None if grasps is None else _grasps_of(grasps, name),
+                settings=settings,
+                executor=executor,
+                workers=workers,
+                progress=progress,
+            )
+            found, file = run_grasps(run), folder / f"{name}{target.suffixes[0]}"
+            notes = target.write(found, file, station_gripper(station)) if len(found) else ()
+        except BurgError as error:
+            nothing = np.empty(0)
+            yield ObjectLabels(object=name, success=nothing, given=nothing, error=str(error))
+            continue
+        yield ObjectLabels(
+            object=name,
+            run=run,
+            success=success_labels(found),
+            given=success_labels(run.candidates.grasps),
+            path=file if len(found) else None,
+            notes=notes,
         )
-        found = run_grasps(run)
-        given = success_labels(run.candidates.grasps)
-        ((path, notes),) = write_each_object(
-            found, folder, target, station_gripper(station)
-        ).items()
-        yield ObjectLabels(name, run, success_labels(found), given, path, notes)
 
 
-SPARE_HEIGHT = 0.1
-"""Metres above `height_to_shake`, for boards that do not lie level."""
-
-
-def scene_of_one(
-    library: ObjectLibrary, name: str, station: Station, protocol: TrialProtocol = "lift"
+def single_object_scene(
+    library: ObjectLibrary, name: str, station: Station, protocol: TrialProtocol, path: Path
 ) -> Scene:
-    """A scene of one object alone: in the middle of the board, or in the air to be shaken.
+    """A scene of one object: in the middle of the board, or above it in the air to be shaken.
+
+    On the board it stands in the orientation of its mesh, or else in its most probable stable pose.
 
     Args:
         library: library of the object.
         name: name of the object.
         station: station on which grasps are executed.
         protocol: protocol of the trials.
+        path: file of the scene, to which the reference to the library is relative.
 
     Raises:
         InvalidInputError: the object is fixed, or cannot stand on a table.
         UnknownNameError: there is no such object.
     """
-    entry = library.entry(name)
+    entry, board = library.entry(name), Board()
     if entry.is_fixed:
         raise InvalidInputError(f"object {name!r} has no mass, so that no grasp holds it")
-    board = Board()
     middle = make_pose(p_AB=(board.size[0] / 2.0, board.size[1] / 2.0, 0.0))
     if protocol == "shake":
-        height = height_to_shake(station) - station.document.X_WS.translation[2]
-        X_SO = middle @ make_pose(p_AB=(0.0, 0.0, height + SPARE_HEIGHT))
+        X_WS = station.document.X_WS.matrix()
+        x, y, _ = (X_WS @ middle)[:3, 3]
+        X_SO = inverse(X_WS) @ make_pose(p_AB=(x, y, height_to_shake(entry, station)))
     elif entry.stable_poses:
         X_SO = middle @ entry.X_SO(entry.proposed_pose)
     else:
         raise InvalidInputError(
-            f"object {name!r} has no stable pose, so that it cannot be lifted off a table; give"
-            " protocol shake, or leave the object out"
-        ).about("protocol", "only")
+            f"object {name!r} has no stable pose, so that it cannot be lifted off a table; label it"
+            " with protocol shake"
+        )
     document = SceneDocument(
         name=name,
-        library=str(library.root.resolve()),
+        library=portable_reference(library.root, path.parent),
         board=board,
         instances=(Instance(object=name, X_SO=Pose.from_matrix(X_SO)),),
     )
-    return place_objects(document, library, Path(f"{name}.yaml"))
+    return place_objects(document, library, path)
+
+
+def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:
+    """The settings of runs that label grasps.
+
+    Raises:
+        InvalidInputError: a setting has no effect.
+    """
+    if settings.mode not in (None, "hand"):
+        raise InvalidInputError(
+            f"mode is {settings.mode!r}, but grasps of objects alone are executed by the hand"
+            " alone; give mode hand, or leave it out"
+        ).about("mode")
+    settings = replace(settings, mode="hand", only=None)
+    if settings.protocol == "lift":
+        return settings
+    for name in ("approach_angle_deg", "tilt_limit_deg", "slip_limit_mm"):
+        if getattr(settings, name) != getattr(EvaluationSettings, name):
+            raise InvalidInputError(
+                f"{name} is {getattr(settings, name):g}, but with protocol shake grasps come from"
+                " all sides, and an object may move in the hand; leave it out"
+            ).about(name)
+    return replace(settings, approach_angle_deg=180.0, tilt_limit_deg=180.0, slip_limit_mm=np.inf)
+
+
+def _grasps_of(grasps: GraspSet, name: str) -> GraspSet:
+    """The grasps of an object, of all its instances."""
+    return without_instance(grasps.select(grasps.object == name))
 
 
 def _chosen_objects(
     library: ObjectLibrary, only: Iterable[str] | None, grasps: GraspSet | None
 ) -> list[str]:
-    """Names of the objects whose grasps are labelled, in the order of the library."""
+    """Names of the objects whose grasps are labelled, in the order of the library.
+
+    Raises:
+        InvalidInputError: there are none, or names of two differ in case alone.
+        UnknownNameError: a name is not in the library.
+    """
     given = None if grasps is None else set(grasps.object.tolist())
     for name in [*(only or ()), *sorted(given or ())]:
         if name not in library.objects:
@@ -187,14 +238,17 @@ def _chosen_objects(
                 f"library {library.name!r} has no object {name!r};"
                 f" {suggest_names(name, library.objects)}"
             )
-    chosen = set(only) if only is not None else set(library.objects)
-    found = [
-        name
-        for name in library.objects
-        if name in chosen
-        and (given is None or name in given)
-        and (only is not None or not library.entry(name).is_fixed)
-    ]
+    chosen = set(library.objects if only is None else only)
+    chosen = chosen if given is None else chosen & given
+    found = [n for n, e in library.objects.items() if n in chosen and (only or not e.is_fixed)]
     if not found:
         raise InvalidInputError(f"library {library.name!r} has no objects to label grasps of")
+    files: dict[str, str] = {}
+    for name in found:
+        other = files.setdefault(name.casefold(), name)
+        if other != name:
+            raise InvalidInputError(
+                f"the names of {other!r} and {name!r} differ in case alone, so that their files"
+                " would be the same on some machines; rename one of them"
+            )
     return found

@@ -151,6 +151,11 @@ class RunRequest:
                 " without approach"
             ).about("protocol", "mode", "approach")
         motion = settings.motion or station.document.motion
+        if settings.protocol == "shake" and motion != station.document.motion:
+            raise InvalidInputError(
+                "a motion of the hand is given, but with protocol shake it neither approaches nor"
+                " lifts; leave the motion out"
+            ).about("protocol")
         if settings.approach and motion.standoff <= 0.0:
             own = motion == station.document.motion
             where = f"of station {station.name!r}" if own else "asked for"
@@ -445,20 +450,24 @@ def _join_sets(parts: list[GraspSet]) -> GraspSet:
     return replace(drop_equal_grasps(GraspSet.concatenate(parts)), provenance=parts[0].provenance)
 
 
-def require_sound(scene: Scene, station: Station, mode: Mode, engine: Engine) -> None:
+def require_sound(scene: Scene, request: RunRequest) -> None:
     """Refuses a scene that cannot be judged.
 
     Raises:
         InvalidInputError: invalid scene, an arm that overlaps it or does not reach the board, or
-            objects or a hand that the engine does not support.
+            objects or a hand that the engine or the protocol does not support.
     """
     from burg_drake.motion import require_usable_arm
+    from burg_drake.simulation import require_single_object
     from burg_drake.station import require_valid_scene
 
+    station = request.station
     require_valid_scene(scene, station)
-    if mode != "hand":
+    if request.mode != "hand":
         require_usable_arm(scene, station)
-    require_scene_for(engine, scene, station)
+    if request.settings.protocol == "shake":
+        require_single_object(scene, station)
+    require_scene_for(request.engine, scene, station)
 
 
 def open_run(

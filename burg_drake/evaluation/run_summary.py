@@ -35,7 +35,7 @@ from burg_drake.evaluation.outcome_counts import (
 )
 from burg_drake.evaluation.results_table import TextValues, contested_rows
 from burg_drake.evaluation.run_folder import Run
-from burg_drake.evaluation.trial_origin import read_motion
+from burg_drake.evaluation.trial_origin import protocol_of, read_motion
 from burg_drake.station import GraspMotion
 
 ARM_REMEDY = "try another station, or another place on the board; mode `hand` leaves the arm out"
@@ -64,9 +64,20 @@ def run_notes(run: Run) -> tuple[str, ...]:
         *run.document.hints,
         *([missing] if missing else []),
         *run_shortfall_notes(run),
+        *_protocol_notes(run),
         *_unexecuted_notes(run),
         *_balance_notes(run),
     )
+
+
+def _protocol_notes(run: Run) -> list[str]:
+    """A note on what outcomes mean where objects were shaken."""
+    if protocol_of(run.document.trial) == "lift":
+        return []
+    return [
+        "objects were shaken, alone and without gravity: here `lifted` means held to the end, and"
+        " `slipped` lost before"
+    ]
 
 
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:

@@ -206,7 +206,7 @@ class Preparer:
             return None
         require_run_folder(work.folder)
         if not (work.folder / RUN_FILE).exists():
-            require_sound(scene, request.station, request.mode, request.engine)
+            require_sound(scene, request)
         given = request.given_candidates(scene)
         remove_unfinished(ensure_writable_folder(work.folder))
         with Journal(work.folder / JOURNAL_FILE):

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 MEASURE_NUMBERS = {"farthest_point": 1.0}
 """Recorded numbers that identify how runs of this release measure displacements."""
 
+SHAKE_NUMBERS = ("shake_acceleration", "turn_acceleration", "shake_frequency", "shake_periods")
+"""Recorded numbers of `ShakeSettings`; none of trials that lift."""
+
 
 def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
     """Limits, approach and protocol as fields of `EvaluationSettings`, from recorded numbers.
@@ -47,7 +50,7 @@ def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
 
 def protocol_of(values: Mapping[str, float]) -> TrialProtocol:
     """Protocol of trials with recorded settings."""
-    return "shake" if "shake_periods" in values else "lift"
+    return "shake" if set(SHAKE_NUMBERS) <= set(values) else "lift"
 
 
 def require_lifts(values: Mapping[str, float], where: Path, what: str) -> None:
@@ -128,8 +131,8 @@ def without_motion(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
-    """Recorded numbers without motion, limits, approach and measures."""
-    known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS)
+    """Recorded numbers without motion, limits, approach, shaking and measures."""
+    known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS, *SHAKE_NUMBERS)
     return {name: value for name, value in without_motion(values).items() if name not in known}
 
 
@@ -301,7 +304,7 @@ def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings
     trial = {name: value for name, value in trial.items() if name not in MEASURE_NUMBERS}
     others, values = without_motion(trial), join_direction(trial)
     motion = {name: value for name, value in values.items() if name not in others}
-    shaken = {f.name: others[f.name] for f in fields(ShakeSettings) if f.name in others}
+    shaken = {name: others[name] for name in SHAKE_NUMBERS if name in others}
     others = {name: value for name, value in others.items() if name not in shaken}
     settings = _read_typed(_restore_booleans(others, TrialSettings), TrialSettings, where)
     if protocol_of(trial) == "shake":

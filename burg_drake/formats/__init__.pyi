@@ -11,6 +11,7 @@ from .burg_toolkit import (
     read_burg_scene as read_burg_scene,
 )
 from .grasp_conversion import (
+    GRASP_SUCCESS_COLUMN as GRASP_SUCCESS_COLUMN,
     LABELLED_BY as LABELLED_BY,
     check_gripper_name as check_gripper_name,
     object_description as object_description,

@@ -87,7 +87,11 @@ from .settings import (
     TrialSettings as TrialSettings,
 )
 from .settled_scene import SettledScene as SettledScene, settle_scene as settle_scene
-from .shaking import ShakeCarrier as ShakeCarrier, height_to_shake as height_to_shake
+from .shaking import (
+    ShakeCarrier as ShakeCarrier,
+    height_to_shake as height_to_shake,
+    require_single_object as require_single_object,
+)
 from .stable_pose_drops import (
     Confirmation as Confirmation,
     DropSettings as DropSettings,

@@ -27,7 +27,7 @@ from burg_drake.grasping import Clearance, HandClearance
 from burg_drake.scene import Scene, SceneLike, as_scene
 from burg_drake.simulation.hand_carrier import HandLiftClearance, LiftCarrier, LiftPath
 from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
-from burg_drake.simulation.shaking import ShakeCarrier, ShakeExecution, require_alone
+from burg_drake.simulation.shaking import ShakeCarrier, ShakeExecution, require_single_object
 from burg_drake.simulation.trial_execution import Execution, OtherTouched, SteppedWorld
 from burg_drake.simulation.trial_result import (
     GripLoad,
@@ -329,7 +329,7 @@ class HandAloneTrial(GraspTrial[W]):
         lock: bool,
     ) -> None:
         if settings.shake is not None:
-            require_alone(scene, station)
+            require_single_object(scene, station)
         self._plain_diagram = build_station_diagram(scene, station, robot="hand")
         clearance = HandClearance(self._plain_diagram)
         super().__init__(

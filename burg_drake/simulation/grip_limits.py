@@ -15,7 +15,14 @@ from functools import partial
 import numpy as np
 from pydrake.multibody.tree import UniformGravityFieldElement
 
-from burg_drake.core import Array, Outcome, UnknownNameError, inverse, suggest_names
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    inverse,
+    suggest_names,
+)
 from burg_drake.simulation.contacts import finger_contact
 from burg_drake.simulation.grasp_trial import HandTrial
 from burg_drake.simulation.mujoco_trial import MujocoTrial
@@ -203,9 +210,13 @@ def take_grip(
         The grip, or the trial's result if the target is not held at its end.
 
     Raises:
-        InvalidInputError: as `HandTrial.run`.
+        InvalidInputError: as `HandTrial.run`, or the trial shakes the target without gravity.
         RuntimeError, SystemExit: Drake failed.
     """
+    if trial.settings.shake is not None:
+        raise InvalidInputError(
+            "the trial shakes its target without gravity; loads of a grip need one that lifts it"
+        )
     result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift, without_hull=True)
     return Grip(trial, instance, friction) if result.outcome.held else result
 

@@ -1,4 +1,4 @@
-"""The trial of a shaken hand: a target alone and without gravity, as data sets of grasps have it.
+"""The trial of a shaken hand: a target alone and without gravity, as in ACRONYM.
 
 The hand stands still, and the target feels the inertial forces of its motion. This is exact: they
 have no component along the closing axis, in which the fingers move, and nothing else is near.
@@ -13,6 +13,7 @@ import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, InvalidInputError, Outcome
+from burg_drake.objects import ObjectEntry
 from burg_drake.scene import Scene
 from burg_drake.simulation.contacts import BodyContact
 from burg_drake.simulation.object_motions import MovingBody
@@ -21,19 +22,25 @@ from burg_drake.simulation.trial_execution import Execution, HandSegment, Steppe
 from burg_drake.simulation.trial_result import TrialResult
 from burg_drake.station import Station, instance_pose
 
-FREE_SPACE = 0.3
-"""Metres between a shaken object and all below it; neither hands nor what they hold are larger."""
+HAND_REACH = 0.3
+"""Metres. No part of a hand is farther from its grasp frame."""
 
 
-def height_to_shake(station: Station) -> float:
-    """Height above which an object is away from table and obstacles [m]."""
+def height_to_shake(entry: ObjectEntry, station: Station) -> float:
+    """Height of an object's origin at which hand and object are above table and obstacles [m].
+
+    Args:
+        entry: the object, in any orientation.
+        station: the station.
+    """
     tops = [0.0]
     for box in station.document.background.values():
         tops.append(box.X_WB.translation[2] + math.hypot(*box.size) / 2.0)
-    return max(tops) + FREE_SPACE
+    farthest = np.maximum(np.abs(entry.lower), np.abs(entry.upper))
+    return max(tops) + HAND_REACH + float(np.linalg.norm(farthest))
 
 
-def require_alone(scene: Scene, station: Station) -> None:
+def require_single_object(scene: Scene, station: Station) -> None:
     """Refuses a scene in which a shaken hand would not be alone with its target.
 
     Raises:
@@ -44,8 +51,8 @@ def require_alone(scene: Scene, station: Station) -> None:
         raise InvalidInputError(
             f"scene {scene.name!r} has {len(names)} objects; a hand is shaken with one alone"
         )
-    height = height_to_shake(station)
-    if instance_pose(scene, station, names[0])[2, 3] < height:
+    height = height_to_shake(scene.entry(names[0]), station)
+    if instance_pose(scene, station, names[0])[2, 3] < height - 1e-6:
         raise InvalidInputError(
             f"scene {scene.name!r}: {names[0]!r} is too near to the table or an obstacle of"
             f" station {station.name!r} to be shaken; place it at {height:.2f} m or more"
@@ -80,13 +87,13 @@ class Shaking:
         self._axis = X_WG[:3, :3] @ turning_axis(X_WO[:3, :3].T @ X_WG[:3, :3])
 
     def _strokes(self, time: float) -> tuple[Array, Array]:
-        """Position, speed and acceleration along the approach (3,) [m], and the same about the
-        closing axis (3,) [rad].
+        """Speed and acceleration along the approach (2,) [m/s, m/s^2], and the same about the
+        closing axis (2,) [rad/s, rad/s^2].
 
         Args:
             time: time since the shaking began [s].
         """
-        settings, still = self._settings, np.zeros(3)
+        settings, still = self._settings, np.zeros(2)
         periods = time * settings.shake_frequency
         if periods < settings.shake_periods:
             return self._stroke(periods, settings.shake_acceleration), still
@@ -99,10 +106,7 @@ class Shaking:
         side = 1.0 if math.floor(periods) % 2 == 0 else -1.0
         omega = 2.0 * math.pi * self._settings.shake_frequency
         phase = 2.0 * math.pi * (periods % 1.0)
-        amplitude = side * acceleration
-        return amplitude * np.array(
-            [(1.0 - math.cos(phase)) / omega**2, math.sin(phase) / omega, math.cos(phase)]
-        )
+        return side * acceleration * np.array([math.sin(phase) / omega, math.cos(phase)])
 
     def wrench(self, time: float, step: float, body: MovingBody) -> tuple[Array, Array]:
         """Inertial force (3,) at the centre of mass [N] and torque (3,) [N m] on a body during a
@@ -113,9 +117,9 @@ class Shaking:
             step: its length [s].
             body: state of the body at the start, with whose speeds those of the hand go.
         """
-        (_, speed, _), now = self._strokes(time)[1], self._strokes(time + 0.5 * step)
-        acceleration = now[0][2] * self._approach
-        w, alpha = speed * self._axis, now[1][2] * self._axis
+        along, about = self._strokes(time + 0.5 * step)
+        acceleration = along[1] * self._approach
+        w, alpha = self._strokes(time)[1][0] * self._axis, about[1] * self._axis
         if not (w.any() or alpha.any()):
             return -body.mass * acceleration, np.zeros(3)
         W, A, B = _cross(w), _cross(alpha), _cross(body.w_W)
@@ -199,16 +203,23 @@ class ShakeCarrier:
         return 0.0
 
     def carries_full_load(self, check: int) -> bool:
-        """Whether the shaking is over."""
+        """Never, as the trial is not decided before the end of the shaking."""
         return False
 
     def is_free_ahead(self) -> bool:
-        """Always, as nothing is near."""
+        """Always True, as nothing is near."""
         return True
 
 
 class ShakeExecution(Execution):
     """Runs a trial of a shaken hand; see `Execution`."""
+
+    def run(self) -> TrialResult:
+        """Runs all phases, and ends the forces on the target."""
+        try:
+            return super().run()
+        finally:
+            self._world.push(self._target, np.zeros(3), np.zeros(3))
 
     def lift(self) -> Outcome | None:
         """Shakes; None if both fingers hold the target at the end, else the outcome."""

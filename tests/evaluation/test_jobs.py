@@ -112,11 +112,15 @@ def test_workers_with_a_card_get_many_grasps_and_halves_of_lost_ones(scene, stat
     candidates = grasps("a", 40_000)
     job = cluster_jobs.GraspJob(Job("a", factory, candidates), WorkerLimits(), None)
     lost = job.take_chunk(2)
-    assert len(lost.items) == 16_384
+    assert len(lost.items) == 4096
     assert not list(job.retry_alone(lost))
     assert job.unsent_count == len(candidates)
-    first, second = job.take_chunk(2), job.take_chunk(2)
+    first = job.take_chunk(2)
+    job.take_back(first)  # it was not begun
+    assert job.take_chunk(2).items == first.items
+    second = job.take_chunk(2)
     assert (*first.items, *second.items) == lost.items
+    assert len(job.take_chunk(1000).items) == 512  # a card takes as long for fewer
     alone = cluster_jobs.SentChunk(job, first.items[:1], losses=2)
     ((_, grasp, verdict),) = job.retry_alone(alone)
     assert grasp is first.items[0] and verdict.outcome is Outcome.SIMULATION_FAILED

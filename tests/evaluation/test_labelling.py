@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core import InvalidInputError, Outcome, UnknownNameError
+from burg_drake.core import InvalidInputError, Outcome, Pose, UnknownNameError
 from burg_drake.evaluation import (
     EvaluationSettings,
     ObjectLabels,
@@ -17,28 +17,39 @@ from burg_drake.evaluation import (
     evaluate,
     label_library,
     load_run,
-    scene_of_one,
 )
 from burg_drake.experiment import plan_trials
-from burg_drake.formats import LABELLED_BY, read_grasp_file, success_labels
+from burg_drake.formats import (
+    LABELLED_BY,
+    read_grasp_file,
+    success_labels,
+    write_grasp_file,
+)
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.pipeline import ObjectSource, build_library
-from burg_drake.simulation import height_to_shake
-from burg_drake.station import Station, load_station
+from burg_drake.station import Station, instance_pose, load_station
 
-SETTINGS = EvaluationSettings(grasps_per_object=3, engine="screening")
+SETTINGS = EvaluationSettings(
+    grasps_per_object=3, only=("cube", "heavy", "wide_"), engine="screening"
+)
 
 
 @pytest.fixture(scope="module")
 def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> ObjectLibrary:
-    """A cube, one that is too heavy to be lifted, and a fixed wall."""
+    """A cube, one that is too heavy to be lifted, one that is too wide for the hand, a long bar
+    whose origin is at its upper end, and a fixed wall."""
     cube = trimesh.creation.box((0.05, 0.05, 0.05))
     cube.apply_translation((0.0, 0.0, 0.025))
+    wide, long = trimesh.creation.box((0.2, 0.2, 0.2)), trimesh.creation.box((0.03, 0.03, 0.7))
+    wide.apply_translation((0.0, 0.0, 0.1))
+    long.apply_translation((0.0, 0.0, -0.35))
     wall = trimesh.creation.box((0.4, 0.05, 0.3))
     out = tmp_path_factory.mktemp("labelled") / "library"
     sources = [
         ObjectSource(name="cube", mesh=cube, mass=0.1),
         ObjectSource(name="heavy", mesh=cube, mass=30.0),
+        ObjectSource(name="wide_", mesh=wide, mass=0.1),
+        ObjectSource(name="long", mesh=long, mass=0.1),
         ObjectSource(name="wall", mesh=wall, fixed=True),
     ]
     assert not build_library(sources, out, confirm=False).failed
@@ -63,14 +74,17 @@ def labelled(
 
 
 def test_each_object_that_can_be_held_gets_a_file_of_labels(labelled: list[ObjectLabels]) -> None:
-    assert [found.object for found in labelled] == ["cube", "heavy"]
-    for found, success in zip(labelled, (1.0, 0.0), strict=True):
+    *held, wide = labelled
+    assert [found.object for found in held] == ["cube", "heavy"]
+    for found, success in zip(held, (1.0, 0.0), strict=True):
         assert found.path.name == f"{found.object}.h5"
         np.testing.assert_array_equal(found.success, [success] * 3)
         read = read_grasp_file(found.path, "acronym").grasps
         np.testing.assert_array_equal(success_labels(read), found.success)
         np.testing.assert_allclose(read.X_OG, found.run.candidates.grasps.X_OG, atol=1e-9)
         assert np.isnan(found.given).all()
+    assert (wide.object, len(wide.success), wide.path, wide.error) == ("wide_", 0, None, "")
+    assert not (held[0].path.parent / "wide_.h5").exists()
 
 
 def test_a_file_says_who_labelled_it_and_how(labelled: list[ObjectLabels]) -> None:
@@ -89,9 +103,11 @@ def test_the_same_call_goes_on_where_it_stopped(
         library, station, out, format="acronym", settings=SETTINGS, workers=1, progress=False
     )
     assert {found.object: found.run.document.stretches for found in again} == before
+    scene = (out / "scenes" / "cube.yaml").read_text()
     other = replace(SETTINGS, protocol="shake")
-    with pytest.raises(InvalidInputError, match="another run"):
-        next(label_library(library, station, out, settings=other, workers=1, progress=False))
+    found = label_library(library, station, out, settings=other, workers=1, progress=False)
+    assert ["another run" in one.error for one in found] == [True, True, True]
+    assert (out / "scenes" / "cube.yaml").read_text() == scene
 
 
 def test_given_grasps_keep_their_labels_beside_the_new_ones(
@@ -102,33 +118,50 @@ def test_given_grasps_keep_their_labels_beside_the_new_ones(
     tmp_path: Path,
 ) -> None:
     given = read_grasp_file(labelled[0].path, "acronym").grasps
-    wrong = replace(given, columns={}, score=np.array([1.0, 0.0, 0.0]))
-    (found,) = label_library(
-        library, station, tmp_path, grasps=wrong, settings=SETTINGS, workers=1, progress=False
+    wrong = given.with_columns(
+        object_in_gripper=np.array([1.0, 0.0, 0.0]), instance=np.array(["left"] * 3)
     )
-    np.testing.assert_array_equal(found.given, [1.0, 0.0, 0.0])
-    np.testing.assert_array_equal(found.success, [1.0, 1.0, 1.0])
+    wrong.save(tmp_path / "wrong.h5")
+    write_grasp_file(wrong, tmp_path / "theirs.h5", "acronym")
+    for path in ("wrong.h5", "theirs.h5"):
+        grasps = read_grasp_file(tmp_path / path).grasps
+        out = tmp_path / path.removesuffix(".h5")
+        (found,) = label_library(
+            library,
+            station,
+            out,
+            format="acronym",
+            grasps=grasps,
+            settings=SETTINGS,
+            workers=1,
+            progress=False,
+        )
+        np.testing.assert_array_equal(found.given, [1.0, 0.0, 0.0])
+        np.testing.assert_array_equal(found.success, [1.0, 1.0, 1.0])
+        again = success_labels(read_grasp_file(found.path, "acronym").grasps)
+        np.testing.assert_array_equal(again, found.success)
 
 
-def test_shaken_objects_are_alone_in_the_air_and_weigh_nothing(
-    labelled: list[ObjectLabels],
-    library: ObjectLibrary,
-    station: Station,
-    judged_here: None,
-    tmp_path: Path,
+def test_shaken_objects_are_alone_in_the_air(
+    library: ObjectLibrary, judged_here: None, tmp_path: Path
 ) -> None:
-    """So the pads hold what is ten times too heavy to be lifted, if it is hardly shaken."""
-    scene = scene_of_one(library, "heavy", station, "shake")
-    assert scene.X_SO("heavy")[2, 3] > height_to_shake(station)
-    settings = replace(SETTINGS, protocol="shake", grasps_per_object=2, only=("cube",))
+    """Also a long one, from all sides and at both ends, over a board that is not level."""
+    tilted = load_station("panda_tabletop")
+    document = replace(tilted.document, X_WS=Pose((0.3, -0.1, 0.0), rpy_deg=(0.0, 5.0, 30.0)))
+    tilted = replace(tilted, document=document)
+    settings = replace(SETTINGS, protocol="shake", grasps_per_object=12, only=("long",))
     (found,) = label_library(
-        library, station, tmp_path, settings=settings, workers=1, progress=False
+        library, tilted, tmp_path, settings=settings, workers=1, progress=False
     )
     run = load_run(found.run.path)
+    entry, X_WO = run.scene().entry("long"), instance_pose(run.scene(), tilted, "long")
+    corners = np.array(np.meshgrid(*zip(entry.lower, entry.upper, strict=True))).reshape(3, -1)
+    assert (X_WO[:3, :3] @ corners + X_WO[:3, 3:])[2].min() > 0.29
     assert run.document.trial["shake_periods"] == 2
     assert run.document.grasps.approach_angle_deg == 180.0
-    assert "tilt_limit" not in run.document.trial or run.document.trial["tilt_limit"] >= np.pi
+    assert run.document.trial["tilt_limit"] >= np.pi and "slip_limit" not in run.document.trial
     assert set(run.results["outcome"].tolist()) == {Outcome.LIFTED.value}
+    assert run.results["z"].min() < -0.4 and run.results["z"].max() > -0.3
     assert np.isnan(run.results["lift"]).all() and np.isnan(run.results["confidence"]).all()
 
 
@@ -149,20 +182,30 @@ def test_shaken_objects_are_not_those_of_a_robot(
 def test_what_cannot_be_labelled_is_refused(
     library: ObjectLibrary, station: Station, tmp_path: Path
 ) -> None:
-    def label(**more) -> None:
-        next(label_library(library, station, tmp_path / "out", progress=False, **more))
+    def label(**more) -> ObjectLabels:
+        return next(label_library(library, station, tmp_path / "out", progress=False, **more))
 
-    with pytest.raises(InvalidInputError, match="has no mass"):
-        label(settings=EvaluationSettings(only="wall"))
     with pytest.raises(UnknownNameError, match=r"no object 'cub'.*cube"):
         label(settings=EvaluationSettings(only="cub"))
     with pytest.raises(InvalidInputError, match="in the camera frame"):
         label(format="graspnet")
+    for more in ({"mode": "arm"}, {"protocol": "shake", "tilt_limit_deg": 10.0}):
+        with pytest.raises(InvalidInputError, match=r"hand alone|may move in the hand"):
+            label(settings=EvaluationSettings(**more))
     assert not (tmp_path / "out").exists()
+    assert "has no mass" in label(settings=EvaluationSettings(only="wall")).error
 
 
-def test_a_shaken_hand_has_no_arm_and_no_approach(station: Station, tmp_path: Path) -> None:
-    for more in ({"mode": "reach"}, {"mode": "hand", "approach": True}):
+def test_only_one_object_is_shaken_and_only_by_the_hand(station: Station, tmp_path: Path) -> None:
+    """What has no effect is refused, before anything is written."""
+    lift = replace(station.document.motion, lift_height=0.1)
+    for more, why in (
+        ({"mode": "reach"}, "protocol shake is for the hand alone"),
+        ({"mode": "hand", "approach": True}, "protocol shake is for the hand alone"),
+        ({"mode": "hand", "motion": lift}, "neither approaches nor lifts"),
+        ({"mode": "hand"}, "has 6 objects; a hand is shaken with one alone"),
+    ):
         settings = EvaluationSettings(protocol="shake", **more)
-        with pytest.raises(InvalidInputError, match="protocol shake is for the hand alone"):
+        with pytest.raises(InvalidInputError, match=why):
             evaluate("tabletop_six", station, tmp_path / "run", settings=settings, progress=False)
+    assert not (tmp_path / "run").exists()

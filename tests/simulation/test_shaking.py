@@ -36,8 +36,10 @@ HEIGHT = 0.6
 ENGINES_TO_SHAKE = ("standard", "mujoco")
 
 
-def in_the_air(object: str, yaw: float = 0.0, height: float = HEIGHT) -> Instance:
-    return Instance(object=object, X_SO=Pose((0.3, 0.2, height), rpy_deg=(0.0, 0.0, yaw)))
+def in_the_air(
+    object: str, rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0), height: float = HEIGHT
+) -> Instance:
+    return Instance(object=object, X_SO=Pose((0.3, 0.2, height), rpy_deg=rpy_deg))
 
 
 @pytest.fixture(scope="module")
@@ -134,9 +136,10 @@ def sliding_block(acceleration: float, limit: float) -> float:
 def test_the_same_with_fingers_swapped_and_the_object_turned(make_scene, engine: str) -> None:
     X_OG = from_above(0.065, y=0.03, yaw=0.1)
     results = []
-    for yaw, grasp in ((0.0, X_OG), (0.0, swap_fingers(X_OG)), (70.0, X_OG)):
-        trial = shaken(make_scene(in_the_air("box", yaw)), engine, turn_acceleration=200.0)
-        results.append(trial.run("box", grasp, friction=0.15))
+    upright, turned = (0.0, 0.0, 0.0), (100.0, -35.0, 70.0)
+    for rpy, grasp in ((upright, X_OG), (upright, swap_fingers(X_OG)), (turned, X_OG)):
+        trial = shaken(make_scene(in_the_air("box", rpy)), engine, turn_acceleration=200.0)
+        results.append(trial.run("box", grasp, friction=0.3, mass=2.0 * BOX_MASS))
     one, *others = results
     assert one.margins.tilt > np.deg2rad(5.0)
     for other in others:

@@ -80,17 +80,31 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             workers=arguments.workers,
             progress=not arguments.quiet,
         ):
-            print(f"wrote {len(found.success)} labelled grasps to {found.path}")
+            if found.path is not None:
+                print(f"wrote {len(found.success)} labelled grasps to {found.path}")
             labelled.append(found)
     labels_table(labelled).show()
-    print_note_lines(dict.fromkeys(note for found in labelled for note in found.notes))
-    failures = sum(len(found.run.failures) for found in labelled)
+    of_runs = (note for found in labelled if found.run for note in evaluation.run_notes(found.run))
+    print_note_lines(dict.fromkeys((*of_runs, *(n for found in labelled for n in found.notes))))
+    return _report_failures(labelled, arguments.output)
+
+
+def _report_failures(labelled: Sequence[evaluation.ObjectLabels], folder: str) -> int:
+    """Prints what could not be evaluated; returns the exit code."""
+    max_objects = 5  # Objects whose error is printed.
+    refused = [found for found in labelled if found.error]
+    for found in refused[:max_objects]:
+        print_remark(f"{found.object}: {found.error}")
+    if len(refused) > max_objects:
+        names = core.list_names([found.object for found in refused[max_objects:]])
+        print_remark(f"{names}: likewise not evaluated; --only shows why")
+    failures = sum(len(found.run.failures) for found in labelled if found.run)
     if failures:
         print_remark(
             f"{failures} grasps could not be simulated and have no label; the tables of results"
-            f" below {Path(arguments.output) / 'runs'} have the reasons"
+            f" below {Path(folder) / evaluation.LABELLING_RUNS_FOLDER} have the reasons"
         )
-    return 1 if failures else 0
+    return 1 if failures or refused else 0
 
 
 def _refuse_limits_of_shaking(arguments: argparse.Namespace) -> None:
@@ -126,18 +140,19 @@ def _given_grasps(arguments: argparse.Namespace) -> core.GraspSet | None:
 
 def labels_table(labelled: Sequence[evaluation.ObjectLabels]) -> core.TextTable:
     """Table of labelled grasps by object; with the agreement where they came with labels."""
-    told = any(np.isfinite(found.given).any() for found in labelled)
+    has_given = any(np.isfinite(found.given).any() for found in labelled)
     table = core.TextTable().names("object").numbers("grasps", "success", "share")
-    if told:
+    if has_given:
         table.numbers("as given")
     for found in labelled:
         known = np.isfinite(found.success)
         success = int(found.success[known].sum())
         share = core.format_percent(success / known.sum()) if known.any() else "-"
         cells = [*map(core.format_count, (len(known), success)), share]
-        if told:
-            both = known & np.isfinite(found.given)
-            same = found.success[both] == found.given[both]
-            cells.append(f"{core.format_percent(same.mean())} of {len(same)}" if len(same) else "-")
+        if has_given:
+            compared = known & np.isfinite(found.given)
+            agree = found.success[compared] == found.given[compared]
+            agreement = f"{core.format_percent(agree.mean())} of {len(agree)}"
+            cells.append(agreement if len(agree) else "-")
         table.row(found.object, *cells)
     return table

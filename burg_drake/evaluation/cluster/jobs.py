@@ -37,7 +37,8 @@ class ChunkSettings:
     """Chunk size, and number of attempts for a grasp or a call."""
 
     max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
-    max_parallel_grasps = 16384  # With trials in parallel: as many as a card has worlds.
+    max_parallel_grasps = 4096  # With trials in parallel; a card takes seconds for them.
+    min_parallel_grasps = 512  # Fewer take a card as long.
     max_losses = 3  # Workers lost at a grasp, the last ones alone, until it is given up.
 
 
@@ -74,11 +75,13 @@ class SentChunk:
         worker: the worker.
         future: future of Dask.
         done: whether the worker has finished; the answer is lost if the worker is lost now.
+        suspect: whether a worker was lost at these items together.
     """
 
     job: ClusterJob
     items: tuple[Any, ...]
     losses: int = 0
+    suspect: bool = False
     worker: ClusterWorker = field(init=False)
     future: Any = field(init=False)
     done: bool = field(init=False, default=False)
@@ -91,15 +94,15 @@ class ClusterJob(ABC):
         what: purpose of the bundle, for messages.
         bundle: the bundle; None if none is needed.
         returned: items that workers did not begin; they are sent before further ones.
-        suspects: items at which a worker was lost, together, with the number of workers lost at
-            an item alone.
+        suspects: groups of items at which a worker was lost, each with the number of workers that
+            were lost at an item alone.
         sent: number of chunks held by workers.
         failed: whether the job is given up.
         deliveries: number of deliveries of the bundle by the worker's address.
     """
 
-    max_items = 1
-    """Maximum number of items in a chunk."""
+    max_items = min_items = 1
+    """Largest number of items in a chunk, and smallest while there are as many."""
     result_timeout = 60.0
     """Seconds to wait for a result, which may have many megabytes or be lost with its worker."""
 
@@ -142,8 +145,9 @@ class ClusterJob(ABC):
             places: number of chunks among which the remaining items could be divided.
         """
         if self.suspects:
-            return SentChunk(self, *self.suspects.popleft())
-        size = min(self.max_items, -(-self.unsent_count // places))
+            return SentChunk(self, *self.suspects.popleft(), suspect=True)
+        size = max(self.min_items, -(-self.unsent_count // places))
+        size = min(size, self.max_items, self.unsent_count)
         again = [self.returned.popleft() for _ in range(min(size, len(self.returned)))]
         fresh = list(islice(self._fresh, size - len(again)))
         self._fresh_count -= len(fresh)
@@ -153,7 +157,7 @@ class ClusterJob(ABC):
         """Returns the items of a chunk that was not begun to the queue."""
         if self.failed:
             return
-        if chunk.losses:
+        if chunk.suspect:
             self.suspects.appendleft((chunk.items, chunk.losses))
         else:
             self.returned.extendleft(reversed(chunk.items))
@@ -222,6 +226,7 @@ class GraspJob(ClusterJob):
         make = job.make_judge
         if isinstance(make, StationJudgeFactory) and make.engine.parallel:
             self.max_items = ChunkSettings.max_parallel_grasps
+            self.min_items = ChunkSettings.min_parallel_grasps
             self.result_timeout = ClusterJob.result_timeout
 
     def task(self, run: str, items: Sequence[Candidate]) -> GraspChunk:

@@ -33,6 +33,7 @@ from burg_drake.evaluation.table_file import is_table
 from burg_drake.evaluation.trial_origin import protocol_of
 from burg_drake.formats import (
     GRASP_FORMATS,
+    GRASP_SUCCESS_COLUMN,
     LABELLED_BY,
     PANDA_GRIPPER,
     Gripper,
@@ -101,8 +102,9 @@ def run_grasps(run: Run) -> GraspSet:
         The grasps with the column `instance` and the columns of the results table, see
         `evaluation.results_table`; NaN or empty for grasps that are not judged yet. Columns of
         given grasps keep their names, prefixed with `INPUT_PREFIX` if the run has a column of that
-        name. The identifier of a grasp is the run's without the instance. The provenance names the
-        run, its copies of scene and station, and the hand, and describes the objects.
+        name, or if they are labels. The identifier of a grasp is the run's without the instance.
+        The provenance names the run, its copies of scene and station, the hand, and what labelled
+        the grasps, and describes the objects.
     """
     # Columns of the results that are attributes of a grasp set.
     own_columns = ("id", "object", "width", "score", "X_OG", *"xyz", "qw", "qx", "qy", "qz")
@@ -119,11 +121,23 @@ def run_grasps(run: Run) -> GraspSet:
         filled[judged] = values
         columns[name] = filled
     columns["instance"] = candidates.instance
-    grasps = candidates.grasps
+    grasps, given_columns = candidates.grasps, dict(candidates.grasps.columns)
+    if GRASP_SUCCESS_COLUMN in given_columns:  # the label is the outcome of the run
+        given_columns[f"{INPUT_PREFIX}{GRASP_SUCCESS_COLUMN}"] = given_columns.pop(
+            GRASP_SUCCESS_COLUMN
+        )
+    engines = sorted(set(results["engine"].tolist())) or [run.document.engine.name]
+    labelled_by = {
+        "engine": ", ".join(engines),
+        "protocol": protocol_of(run.document.trial),
+        "mode": run.document.mode,
+        "trial": run.document.trial,
+        "versions": run.document.versions,
+    }
     return dataclasses.replace(
         grasps,
-        columns={**grasps.columns, **columns},
-        provenance={**grasps.provenance, **run_documents(run)},
+        columns={**given_columns, **columns},
+        provenance={**grasps.provenance, **run_documents(run), LABELLED_BY: labelled_by},
     )
 
 
@@ -138,15 +152,7 @@ def run_documents(run: Run) -> dict[str, Any]:
     gone or have changed.
     """
     folder = run.path.resolve()
-    recorded = run.document
     named: dict[str, Any] = {
-        LABELLED_BY: {
-            "engine": recorded.engine.name,
-            "protocol": protocol_of(recorded.trial),
-            "mode": recorded.mode,
-            "trial": recorded.trial,
-            "versions": recorded.versions,
-        },
         "run": str(folder),
         "scene": str(folder / SCENE_FILE),
         "station": str(folder / STATION_FILE),

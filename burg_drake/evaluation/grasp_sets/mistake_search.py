@@ -299,7 +299,7 @@ def width_ratios(
     """
     from burg_drake.grasping import grasp_contacts
 
-    test, ratios = _fit_test(station, source), [np.empty(0)]
+    test, ratios = _cached_fit_test(station, source), [np.empty(0)]
     for name, part in grasps.items():
         known = np.flatnonzero(part.width > 0.0)[: MistakeLimits.max_grasps]
         contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
@@ -324,7 +324,7 @@ class _MistakeSearch:
         self._frames = frames
         self._gripper = gripper = station_gripper(station)
         self._scene = source if isinstance(source, Scene) else None
-        self._test = _fit_test(station, source)
+        self._test = _cached_fit_test(station, source)
         first = next(iter(grasps.values()))
         how = first.provenance
         X_SM = how.get("X_SM")
@@ -592,19 +592,22 @@ class _FitTest:
         return self._surfaces[object]
 
 
-_KEPT_TESTS: dict[str, _FitTest] = {}
-"""The last tests by station and source: a command asks about the same scene several times."""
+_FIT_TEST_CACHE: dict[str, _FitTest] = {}
+"""Last tests by station and source: a command asks about the same scene several times."""
 
 
-def _fit_test(station: Station, source: Scene | ObjectLibrary) -> _FitTest:
+def _cached_fit_test(station: Station, source: Scene | ObjectLibrary) -> _FitTest:
     """The test for a station and a source, built once while the same ones are asked for."""
     max_kept = 2
-    key = content_hash(station.content, source.content)
-    if key not in _KEPT_TESTS:
-        while len(_KEPT_TESTS) >= max_kept:
-            del _KEPT_TESTS[next(iter(_KEPT_TESTS))]
-        _KEPT_TESTS[key] = _FitTest(station, source)
-    return _KEPT_TESTS[key]
+    library = source.library if isinstance(source, Scene) else source
+    key = content_hash(station.content, source.content, str(library.root.resolve()))
+    test = _FIT_TEST_CACHE.get(key)
+    if test is None:
+        test = _FitTest(station, source)
+        for old in list(_FIT_TEST_CACHE)[: 1 - max_kept]:
+            _FIT_TEST_CACHE.pop(old, None)
+        _FIT_TEST_CACHE[key] = test
+    return test
 
 
 def _choose_mistake(

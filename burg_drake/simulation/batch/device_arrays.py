@@ -142,7 +142,7 @@ class Trials:
         friction, mass: of the target.
         pads: stiffness, damping and impedance of the contact of each pad.
         early: 1 if the trial may end before the end of its lift.
-        turn: 1 if a shaken hand first turns about its closing axis, -1 if it turns the other way.
+        turn_sign: 1 if a shaken hand first turns about its closing axis, -1 for the other sense.
         ways: the approach, and one or two segments: direction in the world, and length.
         checks: number of checks of each; 0 if there is none.
         time: duration of the segments with the target [s].
@@ -171,7 +171,7 @@ class Trials:
     mass: wp.array(dtype=float)
     pads: wp.array2d(dtype=wp.vec3)
     early: wp.array(dtype=int)
-    turn: wp.array(dtype=int)
+    turn_sign: wp.array(dtype=int)
     ways: wp.array2d(dtype=wp.vec4)
     checks: wp.array2d(dtype=int)
     time: wp.array(dtype=float)

@@ -408,7 +408,7 @@ def _trials(starts: TrialStarts, others: int) -> Trials:
     trials.mass = wp.array(starts.mass, dtype=float)
     trials.pads = wp.array(starts.pads, dtype=wp.vec3)
     trials.early = wp.array(starts.early, dtype=int)
-    trials.turn = wp.array(starts.turn, dtype=int)
+    trials.turn_sign = wp.array(starts.turn_sign, dtype=int)
     trials.ways = wp.array(starts.ways, dtype=wp.vec4)
     trials.checks = wp.array(starts.checks, dtype=int)
     trials.time = wp.array(starts.time, dtype=float)

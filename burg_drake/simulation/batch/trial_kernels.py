@@ -79,7 +79,7 @@ def shake_target(c: Constants, trials: Trials, state: WorldStates, physics: Phys
     if begin >= c.shake_periods and begin < 2.0 * c.shake_periods:
         speed = stroke(begin - c.shake_periods, c.turn_acceleration, c.shake_frequency)[0]
     q_WG = to_xyzw(physics.xquat[w, c.hand]) * c.q_HG
-    side = float(trials.turn[state.trial[w]])
+    side = float(trials.turn_sign[state.trial[w]])
     axis = wp.quat_rotate(q_WG, wp.vec3(side, 0.0, 0.0))
     omega, alpha = speed * axis, alpha_size * axis
     p, v = c.target_qpos, c.target_dof

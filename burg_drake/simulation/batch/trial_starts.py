@@ -54,7 +54,7 @@ class TrialStarts:
         friction, mass: (N,) of the target.
         pads: (N, 2, 3) see `MujocoWorld.pad_contacts`.
         early: (N,) whether the trial may end before the end of its lift.
-        turn: (N,) sense in which a shaken hand turns first, see `turning_axis`.
+        turn_sign: (N,) sense in which a shaken hand turns first, see `turning_axis`.
         ways: (N, 3, 4) approach, if any, and one or two segments: direction and length [m].
         checks: (N, 3) number of contact checks of each; 0 if there is none.
         time: (N,) duration of the segments with the target [s].
@@ -69,7 +69,7 @@ class TrialStarts:
     mass: Array
     pads: Array
     early: Array
-    turn: Array
+    turn_sign: Array
     ways: Array
     checks: Array
     time: Array
@@ -156,7 +156,7 @@ def trial_starts(
         mass=loads.mass,
         pads=pads,
         early=np.full(len(X_WG), not trial.engine.whole_trial),
-        turn=np.array([turning_axis(X[:3, :3].T)[0] for X in X_GO]),
+        turn_sign=np.array([turning_axis(X[:3, :3].T)[0] for X in X_GO]),
         ways=ways,
         checks=checks,
         time=time,

@@ -76,13 +76,17 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
     return cards if name is None else [known[name]]
 
 
-def kernels_are_compiled() -> bool:
-    """Whether kernels of trials are in Warp's cache; others may still have to be compiled, as some
-    depend on the number of joints."""
+def kernels_are_compiled(device: wp.Device) -> bool:
+    """Whether the kernels of trials are in Warp's cache for a device of `find_devices`; others may
+    still have to be compiled, as some depend on the number of joints."""
     import warp as wp
 
-    folder = wp.config.kernel_cache_dir  # set by `find_devices`
-    return folder is not None and any(Path(folder).glob("*trial_kernels*"))
+    from burg_drake.simulation.batch import trial_kernels
+
+    module = wp.get_module(trial_kernels.__name__).get_module_identifier()
+    kinds = (".cubin", ".ptx") if device.is_cuda else (".o",)
+    files = Path(wp.config.kernel_cache_dir, module).glob("*")
+    return any(file.suffix in kinds for file in files)
 
 
 @contextmanager
