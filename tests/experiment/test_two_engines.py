@@ -31,7 +31,7 @@ from burg_drake.experiment import (
     comparison_json,
     comparison_page,
 )
-from burg_drake.simulation import NO_GRIP_LIMITS, TrialSettings
+from burg_drake.simulation import NO_GRIP_LIMITS, ShakeSettings, TrialSettings
 from burg_drake.station import ENGINES, GraspMotion
 from tests.evaluation.inline_executor import Inline
 from tests.experiment import known_runs
@@ -341,15 +341,13 @@ def test_every_setting_of_a_trial_is_compared(tmp_path: Path) -> None:
     names = [f.name for f in dataclasses.fields(TrialSettings) if f.name != "motion"]
     for name in names:
         value = getattr(default, name)
-        other = settings_numbers(
-            dataclasses.replace(
-                default, **{name: not value if isinstance(value, bool) else 0.9 * value}
-            )
-        )
+        changed = not value if isinstance(value, bool) else 0.9 * (value or 0.0)
+        changed = ShakeSettings() if name == "shake" else changed
+        other = settings_numbers(dataclasses.replace(default, **{name: changed}))
         made = known_runs.make_run(tmp_path / name, scene, {"mug": LIFTED}, trial=other)
         with pytest.raises(InvalidInputError, match=f"different phases: {name.replace('_', ' ')} "):
             compare(run, made)
-        assert name in TRIAL_SETTING_UNITS or isinstance(value, bool)
+        assert name in (*TRIAL_SETTING_UNITS, "shake") or isinstance(value, bool)
 
 
 def test_all_that_differs_is_named_at_once(

@@ -205,7 +205,7 @@ TRIAL_SETTING_UNITS = {
     "tilt_limit": "degrees",
 }
 """Units of settings in messages; other settings have none."""
-Value = float | bool | tuple[float, ...] | None
+Value = float | bool | str | tuple[float, ...] | None
 
 
 def unpredictable_outcomes(mode: Mode, *, approach: bool) -> frozenset[RealOutcome]:
@@ -290,6 +290,12 @@ def _phase_settings(runs: ComparedRuns) -> dict[str, Value]:
     values["lift_direction"] = tuple(motion.direction_W.tolist())
     if motion.shortest == motion.lift_height:
         values["least_lift"] = None
+    if settings.shake is not None:
+        shake = settings.shake
+        values["shake"] = (
+            f"{shake.shake_acceleration:.12g} m/s^2, {shake.turn_acceleration:.12g} rad/s^2,"
+            f" {shake.shake_periods} times at {shake.shake_frequency:.12g} Hz"
+        )
     values["approach"] = settings.approach or runs.opened.document.mode == "arm"
     unlimited: Mapping[str, float] = NO_GRIP_LIMITS
     return {k: None if k in unlimited and v == unlimited[k] else v for k, v in values.items()}
@@ -304,8 +310,8 @@ def _are_equal(one: Value, other: Value) -> bool:
 
 def _value_text(name: str, value: Value) -> str:
     """Displayed value with enough digits to distinguish different values."""
-    if value is None:
-        return "none"
+    if value is None or isinstance(value, str):
+        return value or "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, tuple):
