@@ -33,7 +33,7 @@ from burg_drake.station import ENGINES
 
 HEIGHT = 0.6
 """Of the origin of the shaken object [m]."""
-ENGINES_TO_SHAKE = ("standard", "mujoco")
+ENGINES_TO_SHAKE = ("screening", "mujoco")
 
 
 def in_the_air(
@@ -162,7 +162,7 @@ def test_only_one_object_away_from_the_table_is_shaken(make_scene) -> None:
         (make_scene(in_the_air("box", height=0.0)), "too near to the table"),
     ):
         with pytest.raises(InvalidInputError, match=why):
-            shaken(scene, "standard")
+            shaken(scene, "screening")
 
 
 def test_strength_and_duration_are_checked() -> None:
