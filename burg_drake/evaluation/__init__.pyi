@@ -179,7 +179,6 @@ from .labelling import (
     LABELLING_RUNS_FOLDER as LABELLING_RUNS_FOLDER,
     ObjectLabels as ObjectLabels,
     label_library as label_library,
-    single_object_scene as single_object_scene,
 )
 from .many_scenes import campaign_document as campaign_document, read_scenes as read_scenes
 from .outcome_counts import (

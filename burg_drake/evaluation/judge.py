@@ -124,7 +124,7 @@ def starting_note(engine: Engine, device: str | None) -> str:
 
     if kernels_are_compiled(find_devices(device)[0]):
         return ""
-    return "compiling kernels, which takes two or three minutes, once"
+    return "compiling kernels, which takes up to three minutes, once"
 
 
 def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:

@@ -102,7 +102,8 @@ def label_library(
         The labels of each object, once its file is written.
 
     Raises:
-        InvalidInputError: a bad argument, a setting that has no effect, or no object to label.
+        InvalidInputError: a bad argument, a setting that has no effect, no object to label, or a
+            folder with labels by other settings.
         UnknownNameError: there is no such object or format.
         MissingDependencyError: the engine is not installed.
     """
@@ -112,7 +113,7 @@ def label_library(
         raise InvalidInputError(
             f"{target.title} has grasps in the {target.frame} frame, but those of objects are"
             " labelled; give a format with the frame of objects"
-        ).about("format")
+        )
     settings = _labelling_settings(settings)
     RunRequest.of(station, settings)
     if executor is None:
@@ -121,9 +122,10 @@ def label_library(
     for name in names:
         run_folder = folder / LABELLING_RUNS_FOLDER / name
         path = folder / LABELLING_SCENES_FOLDER / f"{name}.yaml"
+        is_new = not (run_folder / RUN_FILE).exists()
         try:
             scene = single_object_scene(library, name, station, settings.protocol, path)
-            if not (run_folder / RUN_FILE).exists():
+            if is_new:
                 ensure_writable_folder(path.parent)
                 save_scene(scene.document, path)
             run = evaluate(
@@ -139,6 +141,8 @@ def label_library(
             found, file = run_grasps(run), folder / f"{name}{target.suffixes[0]}"
             notes = target.write(found, file, station_gripper(station)) if len(found) else ()
         except BurgError as error:
+            if not is_new:  # other settings, which concern all objects
+                raise
             nothing = np.empty(0)
             yield ObjectLabels(object=name, success=nothing, given=nothing, error=str(error))
             continue
@@ -170,9 +174,13 @@ def single_object_scene(
         InvalidInputError: the object is fixed, or cannot stand on a table.
         UnknownNameError: there is no such object.
     """
-    entry, board = library.entry(name), Board()
+    entry = library.entry(name)
     if entry.is_fixed:
         raise InvalidInputError(f"object {name!r} has no mass, so that no grasp holds it")
+    margin = 0.1  # Metres; the board is as large as the object needs.
+    widest = 2.0 * float(np.linalg.norm(np.maximum(np.abs(entry.lower), np.abs(entry.upper))))
+    width, depth = (max(side, widest + margin) for side in Board().size)
+    board = Board(size=(width, depth))
     middle = make_pose(p_AB=(board.size[0] / 2.0, board.size[1] / 2.0, 0.0))
     if protocol == "shake":
         X_WS = station.document.X_WS.matrix()

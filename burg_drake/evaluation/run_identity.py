@@ -20,6 +20,7 @@ from burg_drake.evaluation.trial_origin import (
     limits_text,
     measure_text,
     other_numbers,
+    protocol_of,
     recorded_motion_text,
 )
 
@@ -47,6 +48,7 @@ def request_identity(document: AnyRunDocument) -> dict[str, str]:
     given = f"given, content {grasps.content[:HASH_DIGITS]}{_only_words(grasps)}"
     simulated = "simulated" if document.trial.get("approach") else "not simulated"
     return {
+        "protocol": protocol_of(document.trial),
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
         SETTINGS_TOPIC: settings,

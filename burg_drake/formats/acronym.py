@@ -251,6 +251,8 @@ def _notes_on_losses(
         )
     numbers = [key for key, values in grasps.columns.items() if values.dtype.kind in "fiub"]
     carried = ("object", "width", "score", "outcome", *numbers)
+    if LABELLED_BY in grasps.provenance:
+        carried += ("engine", "mode", "engine_settings", "trial_settings", "versions")
     return (*notes, *conversion_losses(grasps, carried, ACRONYM_FORMAT.title))
 
 
@@ -261,7 +263,7 @@ ACRONYM_FORMAT = GraspFormat(
     frame="object",
     source="github.com/NVlabs/acronym, acronym_tools/acronym.py; Eppner et al., ICRA 2021",
     carries=("score as object_in_gripper", "width", "further numbers", "mesh, scale and mass"),
-    cannot_carry=("ids", "several objects", "text columns", "provenance"),
+    cannot_carry=("ids", "several objects", "text columns", "provenance, but for labels"),
     X_GF=lambda gripper: gripper.X_GB,
     recognises=recognise_acronym,
     read=read_acronym,

@@ -27,7 +27,7 @@ def test_writes_labels_and_prints_them_by_object(tmp_path: Path, capsys: Capture
     out = capsys.readouterr().out
     labels = success_labels(read_grasp_file(tmp_path / "box.h5", "acronym").grasps)
     assert len(labels) == 3
-    assert f"wrote 3 labelled grasps to {tmp_path / 'box.h5'}" in out
+    assert f"wrote 3 labelled grasps to {tmp_path / 'box.h5'} as acronym (ACRONYM)" in out
     (row,) = (line.split() for line in out.splitlines() if line.startswith("box "))
     assert row[:3] == ["box", "3", f"{int(labels.sum())}"]
     assert out.count("has no place for") == 1
@@ -56,13 +56,15 @@ def test_labels_of_others_are_compared(shaken: Path, tmp_path: Path, capsys: Cap
     GraspSet.create(grasps.X_OG, object="theirs", score=np.array([0.0, 1.0])).save(theirs)
     more = ["--rename", "box", "--protocol", "shake", "--engine", "screening"]
     assert label("--grasps", theirs, *more, "-o", str(tmp_path / "again")) == 0
-    assert "50.0 % of 2" in capsys.readouterr().out
+    assert "1 of 2" in capsys.readouterr().out
 
 
 def test_what_has_no_effect_is_refused(tmp_path: Path, capsys: Capture) -> None:
     for more in (["--tilt-limit", "10"], ["--approach-angle", "30"]):
         assert label("--protocol", "shake", *more, "-o", str(tmp_path / "out")) == 2
         assert f"{more[0]} has no effect with --protocol shake" in capsys.readouterr().err
+    assert label("--rename", "box", "-o", str(tmp_path / "out")) == 2
+    assert "--rename is for grasp files; add --grasps FILE" in capsys.readouterr().err
     assert label("--to", "graspnet", "-o", str(tmp_path / "out")) == 2
     assert "in the camera frame" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -40,9 +40,9 @@ def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Ob
     whose origin is at its upper end, and a fixed wall."""
     cube = trimesh.creation.box((0.05, 0.05, 0.05))
     cube.apply_translation((0.0, 0.0, 0.025))
-    wide, long = trimesh.creation.box((0.2, 0.2, 0.2)), trimesh.creation.box((0.03, 0.03, 0.7))
+    wide, long = trimesh.creation.box((0.2, 0.2, 0.2)), trimesh.creation.box((0.03, 0.7, 0.03))
     wide.apply_translation((0.0, 0.0, 0.1))
-    long.apply_translation((0.0, 0.0, -0.35))
+    long.apply_translation((0.0, -0.35, 0.0))
     wall = trimesh.creation.box((0.4, 0.05, 0.3))
     out = tmp_path_factory.mktemp("labelled") / "library"
     sources = [
@@ -105,8 +105,8 @@ def test_the_same_call_goes_on_where_it_stopped(
     assert {found.object: found.run.document.stretches for found in again} == before
     scene = (out / "scenes" / "cube.yaml").read_text()
     other = replace(SETTINGS, protocol="shake")
-    found = label_library(library, station, out, settings=other, workers=1, progress=False)
-    assert ["another run" in one.error for one in found] == [True, True, True]
+    with pytest.raises(InvalidInputError, match="; protocol is lift there, shake here"):
+        next(label_library(library, station, out, settings=other, workers=1, progress=False))
     assert (out / "scenes" / "cube.yaml").read_text() == scene
 
 
@@ -160,8 +160,8 @@ def test_shaken_objects_are_alone_in_the_air(
     assert run.document.trial["shake_periods"] == 2
     assert run.document.grasps.approach_angle_deg == 180.0
     assert run.document.trial["tilt_limit"] >= np.pi and "slip_limit" not in run.document.trial
-    assert set(run.results["outcome"].tolist()) == {Outcome.LIFTED.value}
-    assert run.results["z"].min() < -0.4 and run.results["z"].max() > -0.3
+    assert set(run.results["outcome"].tolist()) <= {Outcome.LIFTED, Outcome.SLIPPED}
+    assert run.results["y"].min() < -0.4 and run.results["y"].max() > -0.3
     assert np.isnan(run.results["lift"]).all() and np.isnan(run.results["confidence"]).all()
 
 

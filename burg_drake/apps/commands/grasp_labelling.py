@@ -35,8 +35,10 @@ def add_grasps_label_options(parser: options.Parser) -> None:
         type=options.input_file,
         help="label the grasps of this file or run, instead of sampling",
     )
-    options.add_reading_options(parser)
-    options.add_renaming(parser)
+    group = parser.add_argument_group("with --grasps")
+    options.add_reading_options(group)
+    options.add_renaming(group)
+    parser.set_defaults(grasp_file_options=[action.dest for action in group._group_actions])
     options.add_station(parser)
     options.add_settings_options(
         parser,
@@ -57,6 +59,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     from burg_drake.objects import load_library
     from burg_drake.station import load_station
 
+    options.require_grasp_file(arguments)
     options.refuse_sampling_options_with_file(arguments)
     _refuse_limits_of_shaking(arguments)
     library, station = load_library(arguments.library), load_station(arguments.station)
@@ -66,6 +69,8 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
         grasps_per_object=options.grasps_per_object(arguments),
         only=arguments.only,
     )
+    target = arguments.target or formats.BURG_DRAKE_FORMAT.name
+    output = options.grasp_output(f"{arguments.output}/", target, frame="object")
     grasps = _given_grasps(arguments)
     labelled = []
     with options.cluster_from_options(arguments) as executor:
@@ -73,7 +78,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             library,
             station,
             arguments.output,
-            format=arguments.target or formats.BURG_DRAKE_FORMAT.name,
+            format=output.format.name,
             grasps=grasps,
             settings=settings,
             executor=executor,
@@ -81,7 +86,9 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             progress=not arguments.quiet,
         ):
             if found.path is not None:
-                print(f"wrote {len(found.success)} labelled grasps to {found.path}")
+                of_format = options.format_title(output.format)
+                count = core.count_with_noun(len(found.success), "labelled grasp")
+                print(f"wrote {count} to {found.path} as {of_format}")
             labelled.append(found)
     labels_table(labelled).show()
     of_runs = (note for found in labelled if found.run for note in evaluation.run_notes(found.run))
@@ -143,7 +150,7 @@ def labels_table(labelled: Sequence[evaluation.ObjectLabels]) -> core.TextTable:
     has_given = any(np.isfinite(found.given).any() for found in labelled)
     table = core.TextTable().names("object").numbers("grasps", "success", "share")
     if has_given:
-        table.numbers("as given")
+        table.numbers("label as given")
     for found in labelled:
         known = np.isfinite(found.success)
         success = int(found.success[known].sum())
@@ -152,7 +159,6 @@ def labels_table(labelled: Sequence[evaluation.ObjectLabels]) -> core.TextTable:
         if has_given:
             compared = known & np.isfinite(found.given)
             agree = found.success[compared] == found.given[compared]
-            agreement = f"{core.format_percent(agree.mean())} of {len(agree)}"
-            cells.append(agreement if len(agree) else "-")
+            cells.append(f"{int(agree.sum())} of {len(agree)}" if len(agree) else "-")
         table.row(found.object, *cells)
     return table

@@ -287,7 +287,7 @@ def add_only(parser: Parser, what: str) -> None:
     )
 
 
-def add_renaming(parser: Parser) -> None:
+def add_renaming(parser: Any) -> None:
     """Adds the option --rename; in evaluate it is called --grasps-object."""
     for option, help in (
         ("--rename", "rename an object of the file, or with OURS alone all"),

@@ -23,7 +23,7 @@ POSE_FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
 """Frames of poses in grasp files: option values, and their names in `formats`."""
 
 
-def add_reading_options(parser: Parser, *, all_corrections: bool = False) -> None:
+def add_reading_options(parser: Any, *, all_corrections: bool = False) -> None:
     """Adds the options --from, --gripper-link and --correction, for reading a file; the help names
     all corrections, or only an example."""
     parser.add_argument(
