@@ -121,6 +121,7 @@ from .frames import (
     MAX_POSE_COORDINATE as MAX_POSE_COORDINATE,
     canonical_fingers as canonical_fingers,
     check_pose as check_pose,
+    cross_matrix as cross_matrix,
     grasp_from_axes as grasp_from_axes,
     inverse as inverse,
     make_pose as make_pose,

@@ -91,6 +91,17 @@ def quaternion_from_rotation(R_AB: ArrayLike) -> Array:
     return _convert_rotations(R_AB, lambda R: R.as_quat(canonical=True, scalar_first=True), 4)
 
 
+def cross_matrix(p: ArrayLike) -> Array:
+    """(..., 3) -> (..., 3, 3) matrices M with M v = p x v."""
+    p = np.asarray(p, dtype=float)
+    x, y, z = p[..., 0], p[..., 1], p[..., 2]
+    M = np.zeros((*p.shape, 3))
+    M[..., 0, 1], M[..., 0, 2] = -z, y
+    M[..., 1, 0], M[..., 1, 2] = z, -x
+    M[..., 2, 0], M[..., 2, 1] = -y, x
+    return M
+
+
 def rotation_angle(R_AB: ArrayLike) -> Array:
     """(..., 3, 3) -> (...,) angle of the rotation [rad], in [0, pi].
 

@@ -10,7 +10,7 @@ import trimesh
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import Array, Pose, inverse, make_pose, transform_points
+from burg_drake.core import Array, Pose, cross_matrix, inverse, make_pose, transform_points
 from burg_drake.geometry import convex_hull
 from burg_drake.objects.library import Fit, ObjectEntry, ObjectLibrary, Primitive
 from burg_drake.objects.shape_fit import surface_distance
@@ -158,7 +158,7 @@ def _enclosing_box(corners: Array, points: Array, R_OP: Array) -> Primitive:
         p = corners @ R_OP
         extent = np.maximum(np.ptp(p, axis=0), 1e-9)
         # in axes rotated by w, p moves by p x w; columns: w, upper and lower bounds
-        turned = _cross_matrix(p)
+        turned = cross_matrix(p)
         rows, limits = [], []
         for k in range(3):
             upper, lower = np.zeros((len(p), 6)), np.zeros((len(p), 6))
@@ -208,7 +208,7 @@ def _shrinking_motion(p: Array) -> Array:
     radius = np.maximum(np.hypot(p[:, 0], p[:, 1]), 1e-12)
     size, height = float(radius.max()), float(np.ptp(p[:, 2]))
     u = np.column_stack([p[:, :2] / radius[:, None], np.zeros(n)])
-    turned = _cross_matrix(p)[..., :2]
+    turned = cross_matrix(p)[..., :2]
     # columns: rotation about x and y, shift along x and y, radius, upper, lower
     radial = np.einsum("nk,nkj->nj", u, turned)
     rows = np.zeros((3 * n, 7))
@@ -230,13 +230,6 @@ def _solve_linear_program(
         cost, A_ub=rows, b_ub=limits, bounds=[(-b, b) for b in bounds] + free, method="highs"
     )
     return result.x if result.success else np.zeros(len(cost))
-
-
-def _cross_matrix(p: Array) -> Array:
-    """(N, 3, 3) matrices M with M w = p x w for points p (N, 3)."""
-    zero = np.zeros(len(p))
-    x, y, z = p.T
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
 
 
 def _as_triple(values: Array) -> tuple[float, float, float]:

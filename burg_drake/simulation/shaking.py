@@ -1,7 +1,7 @@
 """The trial of a shaken hand: a target alone and without gravity, as in ACRONYM.
 
-The hand stands still, and the target feels the inertial forces of its motion. This is exact: they
-have no component along the closing axis, in which the fingers move, and nothing else is near.
+The hand stands still, and the target feels the inertial forces of its motion. The fingers need
+none: they move along the closing axis alone, and there the inertial forces are 0.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, InvalidInputError, Outcome
+from burg_drake.core import Array, InvalidInputError, Outcome, cross_matrix
 from burg_drake.objects import ObjectEntry
 from burg_drake.scene import Scene
 from burg_drake.simulation.contacts import BodyContact
@@ -122,19 +122,13 @@ class Shaking:
         w, alpha = self._strokes(time)[1][0] * self._axis, about[1] * self._axis
         if not (w.any() or alpha.any()):
             return -body.mass * acceleration, np.zeros(3)
-        W, A, B = _cross(w), _cross(alpha), _cross(body.w_W)
+        W, A, B = cross_matrix(w), cross_matrix(alpha), cross_matrix(body.w_W)
         inertia = body.I_W
         acceleration = acceleration + (A + W @ W) @ (body.p_W - self._origin)
         acceleration += 2.0 * W @ body.v_W
         torque = inertia @ (alpha - B @ w) + (W + B) @ inertia @ w
         torque += W @ inertia @ body.w_W
         return -body.mass * acceleration, -torque
-
-
-def _cross(v: Array) -> Array:
-    """Matrix (3, 3) of the vector product with v (3,) from the left."""
-    x, y, z = v.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def shake_checks(settings: TrialSettings) -> int:

@@ -48,6 +48,7 @@ def test_shaken_grasps_are_replayed_and_can_be_made_again(shaken: Path, capsys: 
     assert "shaken 2 times along the approach" in out
     words = re.sub(r"<[^>]+>", " ", (run.path / "report.html").read_text()).split()
     assert words[words.index("--protocol") + 1] == "shake"
+    assert "mode hand, protocol shake, engine screening" in " ".join(words)
 
 
 def test_labels_of_others_are_compared(shaken: Path, tmp_path: Path, capsys: Capture) -> None:

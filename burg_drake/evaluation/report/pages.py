@@ -80,7 +80,7 @@ from burg_drake.evaluation.run_document import CampaignDocument, RunDocument
 from burg_drake.evaluation.run_folder import REPORT_FILE, Run
 from burg_drake.evaluation.run_summary import summarize
 from burg_drake.evaluation.table_parts import StoredRows
-from burg_drake.evaluation.trial_origin import engine_label
+from burg_drake.evaluation.trial_origin import engine_label, protocol_of
 from burg_drake.visualization import (
     OUTCOME_GROUPS,
     Html,
@@ -236,10 +236,13 @@ def campaign_page(campaign: Campaign) -> str:
 
 
 def _run_description(document: RunDocument | CampaignDocument, count: int | None = None) -> str:
-    """Origin and number of the grasps, mode, engine, seed and day of a run."""
+    """Origin and number of the grasps, mode and protocol, engine, seed and day of a run."""
     how = "sampled" if document.grasps.origin == "sampled" else "given"
     grasps = f"{how} grasps" if count is None else f"{format_count(count)} {how} grasps"
-    facts = [grasps, f"mode {document.mode}", f"engine {engine_label(document.engine)}"]
+    mode = f"mode {document.mode}"
+    if (protocol := protocol_of(document.trial)) != "lift":
+        mode += f", protocol {protocol}"
+    facts = [grasps, mode, f"engine {engine_label(document.engine)}"]
     facts += [f"seed {document.seed}", *(s.started[:10] for s in document.stretches[:1])]
     return ", ".join(facts)
 
