@@ -358,6 +358,11 @@ class MujocoWorld:
             w_W,
         )
 
+    def shift(self, body: BodyIndex, distance_W: Array) -> None:
+        """Shifts a free body by a distance (3,) [m]."""
+        at = self.model.jnt_qposadr[self.model.body_jntadr[int(body)]]
+        self.data.qpos[at : at + 3] += distance_W
+
     def push(self, body: BodyIndex, force_W: Array, torque_W: Array) -> None:
         """Applies a force (3,) at the centre of mass of a body [N] and a torque (3,) [N m], and
         none to others, until the next call."""

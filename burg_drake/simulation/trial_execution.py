@@ -27,6 +27,7 @@ from burg_drake.simulation.object_motions import (
     MotionTracker,
     MovingBody,
     PlacedBodies,
+    carried_past,
 )
 from burg_drake.simulation.settings import TrialSettings
 from burg_drake.simulation.trial_result import TrialResult
@@ -122,6 +123,8 @@ class Carrier(Protocol):
 
 MIN_LIFT_SHARE = 0.5
 """Share of the hand's path that a lifted target must follow."""
+SMALLEST_SHIFT = 1e-8
+"""Metres. Targets are not shifted by less."""
 
 
 class OtherTouched(Exception):
@@ -177,6 +180,10 @@ class SteppedWorld(PlacedBodies, NamedBodies, Protocol):
 
     def moving_body(self, body: BodyIndex) -> MovingBody:
         """State of a free body."""
+        ...
+
+    def shift(self, body: BodyIndex, distance_W: Array) -> None:
+        """Shifts a free body by a distance (3,) [m]."""
         ...
 
     def push(self, body: BodyIndex, force_W: Array, torque_W: Array) -> None:
@@ -423,7 +430,8 @@ class Execution:
             OtherTouched: the trial has to run in the complete world.
         """
         before = self._time()
-        self._steps += self._steps_per_check if steps is None else steps
+        steps = self._steps_per_check if steps is None else steps
+        self._steps += steps
         time = self._time()
         while True:
             state = self._world.state() if self._locked else None
@@ -440,7 +448,18 @@ class Execution:
             self._locked -= found
             self._world.release(found, self._locked)
         self._record_contacts(contacts)
+        if self.contact.both:
+            self._keep_in_grip(steps)
         return time
+
+    def _keep_in_grip(self, steps: int) -> None:
+        """Shifts a target that turns in the grip to where the last steps should have left it."""
+        world, target = self._world, self._target
+        p_OG_W = world.X_WG()[:3, 3] - world.X_WB(target)[:3, 3]
+        w_W, step = world.moving_body(target).w_W, world.engine.time_step
+        shift = -carried_past(w_W, p_OG_W, step, steps)
+        if float(np.abs(shift).max()) > SMALLEST_SHIFT:
+            world.shift(target, shift)
 
     def _time(self) -> float:
         """Time of the last contact check [s]: whole time steps, rounded as Drake's own steps

@@ -139,6 +139,14 @@ class TrialWorld:
             np.asarray(velocity.rotational()),
         )
 
+    def shift(self, body: BodyIndex, distance_W: Array) -> None:
+        """Shifts a free body by a distance (3,) [m]."""
+        plant, context = self.diagram.plant, self.plant_context
+        found, positions = plant.get_body(body), plant.GetPositions(context)
+        at = found.floating_positions_start() + 4  # After the quaternion.
+        positions[at : at + 3] += distance_W
+        plant.SetPositions(context, positions)
+
     def push(self, body: BodyIndex, force_W: Array, torque_W: Array) -> None:
         """Applies a force (3,) at the centre of mass of a body [N] and a torque (3,) [N m], and
         none to others, until the next call."""

@@ -25,11 +25,12 @@ MakeScene = Callable[..., Scene]
 @pytest.fixture(scope="session")
 def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Box, block, ball, can, bar, post, a box that weighs 20 kg, and one that is too wide for most
-    hands; each stands on its origin."""
+    hands; each stands on its origin, but for a bar that is 0.3 m away from it."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     ball.apply_translation((0.0, 0.0, 0.03))
     can = trimesh.creation.cylinder(radius=0.03, height=0.1, sections=64)
     can.apply_translation((0.0, 0.0, 0.05))
+    far_bar = box_mesh((0.03, 0.30, 0.04)).apply_translation((0.0, 0.3, 0.0))
     sources = [
         ObjectSource(name="box", mesh=box_mesh(BOX), mass=BOX_MASS),
         ObjectSource(name="heavy", mesh=box_mesh(BOX), mass=20.0),
@@ -37,6 +38,7 @@ def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Pa
         ObjectSource(name="ball", mesh=ball, mass=0.1),
         ObjectSource(name="can", mesh=can, mass=0.2),
         ObjectSource(name="bar", mesh=box_mesh((0.03, 0.30, 0.04)), mass=0.2),
+        ObjectSource(name="far_bar", mesh=far_bar, mass=0.2),
         ObjectSource(name="wide", mesh=box_mesh(WIDE), mass=BOX_MASS),
         ObjectSource(name="post", mesh=box_mesh(POST), mass=0.3),
     ]

@@ -41,6 +41,18 @@ def unlimited(run: Callable[..., TrialResult]) -> dict[float, TrialResult]:
     return {mu: run(mu, whole=True) for mu in FRICTIONS}
 
 
+def test_how_far_a_swinging_bar_slides_does_not_depend_on_its_origin(
+    make_scene: Callable[..., Scene],
+) -> None:
+    settings, slips = replace(TrialSettings(), hold_time=0.3, **NO_GRIP_LIMITS), []
+    for name, offset in (("bar", 0.0), ("far_bar", 0.3)):
+        scene = make_scene(Instance(object=name, X_SO=Pose((0.3, 0.2 - offset, 0.0))))
+        trial = HandTrial(scene, make_station(), engine="standard", settings=settings)
+        X_OG = make_pose(p_AB=(0.0, offset, 0.0)) @ from_above(0.02, y=0.11)
+        slips.append(trial.run(name, X_OG, friction=0.15).margins.slip)
+    assert 0.0015 < slips[0] == pytest.approx(slips[1], rel=0.02)
+
+
 @pytest.mark.thorough
 def test_without_limits_all_that_is_held_is_lifted(unlimited: dict[float, TrialResult]) -> None:
     tilts = [result.margins.tilt for result in unlimited.values()]

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.robot_model.inertia import Inertia
-from tools.robot_model.pad_mesh import PAD_FILE
+from tools.robot_model.pad_mesh import INNER_DEPTH, PAD_FILE
 from tools.robot_model.shapes import PAD, Box, Shape, axis_pose
 
 HYDROELASTIC_MODULUS = 1.0e7
-"""[Pa] Of the rubber pads in effect, and of all else that the robot touches things with."""
+"""[Pa] Of all that the robot touches things with: of the pads as a layer of half their thickness."""
+PAD_MODULUS = HYDROELASTIC_MODULUS * 2 * INNER_DEPTH
+"""[Pa] With which the fronts of the pads are as stiff, see `pad_mesh`."""
 DISSIPATION = 5.0
 """Hunt-Crossley dissipation [s/m]: nothing rebounds faster than 1/5 m/s, while at the closing speed
 of 0.05 m/s damping adds a quarter to the force at first touch and nothing to the settled one."""
@@ -118,11 +120,12 @@ def _visual(mesh: str, yaw: float) -> str:
 
 
 def _collision(shape: Shape) -> str:
+    modulus = HYDROELASTIC_MODULUS
     if shape.name == PAD:
         assert isinstance(shape, Box)
         pose: Sequence[float] = (*shape.p_BG, *shape.rpy)
         geometry = f"<mesh><uri>meshes/{PAD_FILE}</uri></mesh>"
-        hint = ""
+        hint, modulus = "", PAD_MODULUS
     elif isinstance(shape, Box):
         pose = (*shape.p_BG, *shape.rpy)
         geometry = f"<box><size>{numbers(shape.size)}</size></box>"
@@ -144,7 +147,7 @@ def _collision(shape: Shape) -> str:
         f"        <geometry>{geometry}</geometry>\n"
         "        <drake:proximity_properties>\n"
         "          <drake:compliant_hydroelastic/>\n"
-        f"          <drake:hydroelastic_modulus>{HYDROELASTIC_MODULUS:.15g}"
+        f"          <drake:hydroelastic_modulus>{modulus:.15g}"
         "</drake:hydroelastic_modulus>\n"
         f"{hint}"
         f"          <drake:hunt_crossley_dissipation>{DISSIPATION:.15g}"

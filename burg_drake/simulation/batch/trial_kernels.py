@@ -23,7 +23,7 @@ from burg_drake.simulation.batch.device_arrays import (
 )
 from burg_drake.simulation.batch.trial_starts import End
 from burg_drake.simulation.object_motions import SLIP_LEVER
-from burg_drake.simulation.trial_execution import MIN_LIFT_SHARE
+from burg_drake.simulation.trial_execution import MIN_LIFT_SHARE, SMALLEST_SHIFT
 
 APPROACH, CLOSE, LIFT, HOLD = 0, 1, 2, 3
 """Phases of a world; `IDLE_PHASE` is the last."""
@@ -37,6 +37,20 @@ COS_TILTED, MIN_HEIGHT_CHANGE, MIN_HEIGHT_SHARE = 0.70710678, 0.003, 0.1
 def to_xyzw(q: wp.quat):
     """A quaternion of MuJoCo, wxyz, as one of Warp."""
     return wp.quat(q[1], q[2], q[3], q[0])
+
+
+@wp.func
+def target_orientation(c: Constants, physics: Physics, w: int):
+    """The target's orientation by its position, as that of its body is the one before the step."""
+    p = c.target_qpos
+    return wp.normalize(
+        wp.quat(
+            physics.qpos[w, p + 4],
+            physics.qpos[w, p + 5],
+            physics.qpos[w, p + 6],
+            physics.qpos[w, p + 3],
+        )
+    )
 
 
 @wp.func
@@ -83,14 +97,7 @@ def shake_target(c: Constants, trials: Trials, state: WorldStates, physics: Phys
     axis = wp.quat_rotate(q_WG, wp.vec3(side, 0.0, 0.0))
     omega, alpha = speed * axis, alpha_size * axis
     p, v = c.target_qpos, c.target_dof
-    q_WO = wp.normalize(
-        wp.quat(
-            physics.qpos[w, p + 4],
-            physics.qpos[w, p + 5],
-            physics.qpos[w, p + 6],
-            physics.qpos[w, p + 3],
-        )
-    )
+    q_WO = target_orientation(c, physics, w)
     p_WO = wp.vec3(physics.qpos[w, p], physics.qpos[w, p + 1], physics.qpos[w, p + 2])
     v_WO = wp.vec3(physics.qvel[w, v], physics.qvel[w, v + 1], physics.qvel[w, v + 2])
     w_O = wp.vec3(physics.qvel[w, v + 3], physics.qvel[w, v + 4], physics.qvel[w, v + 5])
@@ -305,6 +312,23 @@ def find_motion(c: Constants, state: WorldStates, physics: Physics, w: int, foun
         found.slip = wp.length(p_GO - wp.quat_rotate(turn, state.p_grip[w]))
         found.tilt = rotation_angle(turn)
     return found
+
+
+@wp.func
+def keep_in_grip(c: Constants, state: WorldStates, physics: Physics, w: int):
+    """Shifts a target that turns in the grip to where the last steps should have left it; see
+    `carried_past`."""
+    p, v = c.target_qpos, c.target_dof
+    q_WO = target_orientation(c, physics, w)
+    w_O = wp.vec3(physics.qvel[w, v + 3], physics.qvel[w, v + 4], physics.qvel[w, v + 5])
+    w_W = wp.quat_rotate(q_WO, w_O)
+    q_WH = to_xyzw(physics.xquat[w, c.hand])
+    p_WG = physics.xpos[w, c.hand] + wp.quat_rotate(q_WH, c.p_HG)
+    turned = wp.cross(w_W, wp.cross(w_W, p_WG - physics.xpos[w, c.target]))
+    shift = -0.5 * c.step * c.step * float(c.steps_per_check) * turned
+    if wp.max(wp.abs(shift[0]), wp.max(wp.abs(shift[1]), wp.abs(shift[2]))) > SMALLEST_SHIFT:
+        for i in range(3):
+            physics.qpos[w, p + i] = physics.qpos[w, p + i] + shift[i]
 
 
 @wp.func
@@ -561,6 +585,8 @@ def judge(
         end_trial(c, bodies, trials, state, physics, w, k, end)
         state.phase[w] = IDLE_PHASE
         wp.atomic_add(counts.done, 0, 1)
+    elif k.both:
+        keep_in_grip(c, state, physics, w)
     clear_check(state, w)
 
 
