@@ -1,7 +1,7 @@
 """Agreement of engines with an oracle that shares no code with them (see `oracle`).
 
-    python benchmarks/contact_oracle.py [--engine NAME ...] [--contact KIND] [--hard | --all N]
-        [--converge] [-o FOLDER] [--workers N]
+    python benchmarks/contact_oracle.py [--engine NAME ...] [--contact KIND]
+        [--hard | --all N | --strangers] [--converge] [-o FOLDER] [--workers N]
 
 The objects go through the pipeline as fine meshes, and touch as it decides, or as KIND says. Each
 stands alone on the table; `burg.HandTrial` runs the same grasps as the oracle, with the same mass,
@@ -10,15 +10,16 @@ friction and pose. A verdict is whether the object is held at the end.
 `--hard`, the default, takes the frozen grasps on which a method can be wrong (see `oracle.cases`);
 `--all` takes N random antipodal grasps of each object with mixed friction and mass. Of these the
 oracle judges 3 % less and 3 % more friction as well: where its verdict changes, the grasp is
-marginal, and counts apart. On the frozen grasps two canaries run as well: engines that are known to
-be worse, which must show.
+marginal, and counts apart. `--strangers` takes the frozen grasps of objects that nothing was tuned
+on, half of them hard (see `oracle.strangers`); the table is by kind of object. On the frozen hard
+grasps two canaries run as well: engines that are known to be worse, which must show.
 
 Where an engine disagrees, the oracle also judges the grasp over a table of 1/150 of the stiffness,
 as that of Drake diagrams outside of trials, and with pads of twice the damping. Where its verdict
 changes, the grasp hinges on what neither method knows of the world; the list says so.
 
-`--converge` has the oracle judge the hard cases at half the step and with twice as many samples: of
-72, no verdict changes.
+`--converge` has the oracle judge the grasps at half the step and with twice as many samples, too:
+of 72 hard cases, no verdict changes.
 
 FOLDER keeps the library and a journal (trials.jsonl): a run that was interrupted goes on where it
 was. After a change of contact geometry or engine take a new folder.
@@ -36,10 +37,11 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import get_args
 
-from contact_oracle_report import Probes, differs, print_convergence, print_report
+from contact_oracle_report import Probes, differs, print_report
 from contact_oracle_trials import CANARIES, KNOWN, build, run_engine
-from oracle.cases import MARGIN, Case, draw_cases, judge, load_cases
+from oracle.cases import MARGIN, STRANGER_CASES, Case, draw_cases, judge, load_cases
 from oracle.catalogue import HELD_OUT, SPACING, TUNED
+from oracle.strangers import STRANGERS
 from oracle.trial import DEFAULT_NUMERICS, Numerics
 from trial_journal import Row, TrialJournal
 
@@ -96,40 +98,42 @@ def main() -> None:
     parser.add_argument("--contact", choices=get_args(ContactKind), help="as the pipeline decides")
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument("--hard", action="store_true", help="the frozen hard cases")
+    chosen.add_argument("--strangers", action="store_true", help="those of other objects")
     chosen.add_argument("--all", type=counted, metavar="N", help="random grasps of each object")
     parser.add_argument("--converge", action="store_true", help="the oracle, more finely")
     parser.add_argument("-o", "--output", type=Path, default=Path("contact_oracle"))
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
-    cases = load_cases() if arguments.all is None else random_cases(arguments.all)
-    library = ""
-    labels: list[str] = [ORACLE]
-    if arguments.converge:
-        labels += FINER
-    else:
-        name = "library" if arguments.contact is None else f"library_{arguments.contact}"
-        library = str(build(arguments.output / name, arguments.contact).resolve())
-        canaries = CANARIES if arguments.all is None else ()
-        engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *canaries)))
-        labels += engines
-        labels += PROBES if arguments.all is not None else []
+    names, cases = chosen_cases(arguments)
+    words = ["library", *(["strangers"] if arguments.strangers else [])]
+    words += [arguments.contact] if arguments.contact is not None else []
+    library = str(build(arguments.output / "_".join(words), names, arguments.contact).resolve())
+    is_random = arguments.all is not None
+    canaries = () if is_random or arguments.strangers else CANARIES
+    engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *canaries)))
+    finer, probes = list(FINER) if arguments.converge else [], list(PROBES) if is_random else []
+    runs = [
+        Run(case, label, library) for label in (ORACLE, *engines, *finer, *probes) for case in cases
+    ]
     journal = TrialJournal(arguments.output / "trials.jsonl")
-    runs = [Run(case, label, library) for label in labels for case in cases]
     with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
         journal.complete(pool, runs, chunked, execute)
-        if not arguments.converge:
-            judged = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
-            open_cases = [c for c in cases if any(differs(c, e, judged) for e in engines)]
-            hinges = [Run(case, label, library) for label in HINGES for case in open_cases]
-            journal.complete(pool, hinges, chunked, execute)
-            runs += hinges
-    rows = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
-    if arguments.converge:
-        print_convergence(cases, list(FINER), rows)
-    else:
-        probes = list(PROBES) if arguments.all is not None else []
-        print_report(cases, engines, Probes(probes, list(HINGES)), rows)
+        judged = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
+        open_cases = [c for c in cases if any(differs(c, e, judged) for e in engines)]
+        hinges = [Run(case, label, library) for label in HINGES for case in open_cases]
+        journal.complete(pool, hinges, chunked, execute)
+    rows = {(run.case.id, run.label): journal.rows[run.key] for run in (*runs, *hinges)}
+    print_report(cases, [*engines, *finer], Probes(probes, list(HINGES)), rows)
+
+
+def chosen_cases(arguments: argparse.Namespace) -> tuple[Sequence[str], list[Case]]:
+    """Names of objects, and the grasps of them that were asked for."""
+    if arguments.strangers:
+        return tuple(STRANGERS), load_cases(STRANGER_CASES)
+    if arguments.all is not None:
+        return (*TUNED, *HELD_OUT), random_cases(arguments.all)
+    return (*TUNED, *HELD_OUT), load_cases()
 
 
 def counted(text: str) -> int:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from oracle.cases import Case
+from oracle.strangers import KIND_OF
 
 from burg_drake.core import wilson_interval
 
 ORACLE = "oracle"
+CONFIDENCES = (0.0, 0.6, 0.8, 0.9, 0.95, 1.01)
+"""Ends of the bins."""
 Rows = Mapping[tuple[str, str], dict[str, Any]]
 
 
@@ -50,26 +54,20 @@ def print_report(cases: Sequence[Case], engines: Sequence[str], probes: Probes, 
         "all": settled,
         "tuned": [c for c in settled if not c.held_out],
         "held out": [c for c in settled if c.held_out],
+        "hard": [c for c in settled if c.is_hard],
+        "ordinary": [c for c in settled if not c.is_hard],
         "marginal": marginal,
     }
     print(f"\n{'agreement with the oracle':40} {'':7}  {'95 % interval':>16} {'of':>6}"
           f" {'false lifts':>11} {'false drops':>11}")  # fmt: skip
     for engine in engines:
         for group, chosen in groups.items():
-            if chosen:
+            if chosen and (len(chosen) < len(settled) or group == "all"):
                 print_agreement(f"{engine}, {group}", engine, chosen, rows)
+    print_confidence(settled, engines, rows)
     print_objects(settled, engines, rows)
     for engine in engines:
         print_disagreements(engine, settled, probes, rows)
-
-
-def print_convergence(cases: Sequence[Case], finer: Sequence[str], rows: Rows) -> None:
-    """Prints the verdicts of the oracle that change when it is computed more finely."""
-    for label in finer:
-        changed = [c for c in cases if differs(c, label, rows)]
-        print(f"{label}: {len(changed)} of {len(cases)} verdicts change")
-        for case in changed:
-            print(f"  {line(case, rows)} | {outcome(rows[case.id, label])}")
 
 
 def is_usable(case: Case, engines: Sequence[str], rows: Rows) -> bool:
@@ -107,18 +105,36 @@ def print_agreement(title: str, engine: str, cases: Sequence[Case], rows: Rows) 
     )
 
 
+def print_confidence(cases: Sequence[Case], engines: Sequence[str], rows: Rows) -> None:
+    """How often the oracle confirms verdicts, by the confidence that they come with."""
+    print(f"\n{'confirmed, by confidence':40} {'':7}  {'95 % interval':>16} {'of':>6}")
+    for engine in engines:
+        known = [c for c in cases if rows[c.id, engine].get("confidence") is not None]
+        for low, high in itertools.pairwise(CONFIDENCES):
+            within = [c for c in known if low <= rows[c.id, engine]["confidence"] < high]
+            same = sum(not differs(c, engine, rows) for c in within)
+            if within:
+                a, b = wilson_interval(same, len(within))
+                print(
+                    f"{f'{engine}, {low:.2f} to {min(high, 1.0):.2f}':40} {same / len(within):7.2%}"
+                    f"  {a:6.1%} to {b:6.1%} {len(within):6}"
+                )
+
+
 def print_objects(cases: Sequence[Case], engines: Sequence[str], rows: Rows) -> None:
-    """How many of the verdicts are wrong, by object: lifts that are none + drops that are none."""
-    print(f"\n{'false lifts + false drops':18} {'of':>4}" + "".join(f"{e:>12}" for e in engines))
-    for name in dict.fromkeys(c.object for c in cases):
-        own = [c for c in cases if c.object == name]
+    """How many of the verdicts are wrong, by object, or by kind of object where that is known:
+    lifts that are none + drops that are none."""
+    print(f"\n{'false lifts + false drops':18} {'of':>4}" + "".join(f"{e:>19}" for e in engines))
+    groups = {c.id: KIND_OF.get(c.object, c.object) for c in cases}
+    for name in dict.fromkeys(groups.values()):
+        own = [c for c in cases if groups[c.id] == name]
         cells = []
         for engine in engines:
             wrong = [c for c in own if differs(c, engine, rows)]
             lifts = sum(rows[c.id, engine]["lifted"] for c in wrong)
             cells.append(f"{lifts} + {len(wrong) - lifts}" if wrong else "-")
-        label = f"{name} (held out)" if own[0].held_out else name
-        print(f"{label:22} {len(own):4}" + "".join(f"{cell:>12}" for cell in cells))
+        label = f"{name} (held out)" if all(c.held_out for c in own) else name
+        print(f"{label:22} {len(own):4}" + "".join(f"{cell:>19}" for cell in cells))
 
 
 def print_disagreements(engine: str, cases: Sequence[Case], probes: Probes, rows: Rows) -> None:

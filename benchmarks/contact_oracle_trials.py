@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import shutil
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 import trimesh
 from mixed_grasps import hand_only
 from oracle.cases import Case
-from oracle.catalogue import HELD_OUT, TUNED, thing
+from oracle.catalogue import thing
 
 import burg_drake as burg
 from burg_drake.core import Pose, make_pose, resolve_reference
@@ -36,13 +37,13 @@ is by default, and the standard engine with pads whose dissipation is 50 s/m in 
 KNOWN = {**ENGINES, **CANARIES}
 
 
-def build(out: Path, contact: ContactKind | None) -> Path:
-    """Builds the library of all objects, or what is missing of it.
+def build(out: Path, names: Iterable[str], contact: ContactKind | None) -> Path:
+    """Builds a library of objects of the catalogue, or what is missing of it.
 
     Raises:
         RuntimeError: an object cannot be built.
     """
-    sources = [source(name, contact) for name in (*TUNED, *HELD_OUT)]
+    sources = [source(name, contact) for name in names]
     report = burg.build_library(sources, out, confirm=False)
     if report.failed:
         raise RuntimeError(str(report.failed))
@@ -120,4 +121,5 @@ def run_engine(library: str, case: Case, engine: str) -> dict[str, object]:
         "outcome": str(result.outcome),
         "slip": margins.slip,
         "tilt": margins.tilt,
+        "confidence": result.confidence,
     }

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from contact_oracle_trials import KNOWN, build, run_engine
 from oracle.cases import Case, load_cases
+from oracle.catalogue import HELD_OUT, TUNED
 
 from burg_drake.objects import (
     MAX_CONTACT_DISTANCE,
@@ -56,7 +57,7 @@ def main() -> None:
     parser.add_argument("--engine", default="standard", choices=list(KNOWN))
     parser.add_argument("-o", "--output", type=Path, default=Path("surface_convergence"))
     arguments = parser.parse_args()
-    built = load_library(build(arguments.output / "library", None))
+    built = load_library(build(arguments.output / "library", (*TUNED, *HELD_OUT), None))
     curved = [name for name, e in built.objects.items() if e.contact.kind == "surface"]
     cases = [case for case in load_cases() if case.object in curved]
     print(f"{len(cases)} cases on {len(curved)} objects: {', '.join(curved)}", flush=True)

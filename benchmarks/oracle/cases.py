@@ -1,18 +1,22 @@
-"""Hard grasps: lifted or not, by the oracle alone, for a change of friction by 0.7, but not of 3 %.
+"""Grasps whose verdict the oracle alone has found: hard ones, and others.
 
-    python -m oracle.cases [--each N]          (in the folder above) searches, and writes the list
+    python -m oracle.cases [--each N] [--strangers]   (in the folder above) searches, and writes
 
-The list is frozen in hard_cases.json, and searched anew only when the objects change. A case is one
-where a method can be wrong, as it is near the limit, and one that has an answer, as it is not at
-the limit.
+Hard cases are lifted or not for a change of friction by 0.7, but not of 3 %. A case is one where a
+method can be wrong, as it is near the limit, and one that has an answer, as it is not at the limit.
+Ordinary ones have random friction and mass, and an answer, too. The lists are frozen, and searched
+anew only when the objects change: hard_cases.json has hard ones of the catalogue, and
+stranger_cases.json as many hard as ordinary ones of objects that nothing was tuned on.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +25,12 @@ from .arrays import Array, pose
 from .catalogue import HELD_OUT, SPACING, TUNED, Thing, thing
 from .grasps import draw_grasps
 from .hand import DEFAULT_PHASES, GRAVITY
+from .strangers import HELD_OUT_STRANGERS, STRANGERS
 from .trial import DEFAULT_NUMERICS, Grip, Numerics, Trial, Verdict
 
 HARD_CASES = Path(__file__).with_name("hard_cases.json")
+STRANGER_CASES = Path(__file__).with_name("stranger_cases.json")
+HARD, ORDINARY = "hard", "ordinary"
 FACTOR = 0.7
 """A change of friction by which the verdict of a hard case changes, down or up."""
 MARGIN = 0.03
@@ -74,7 +81,12 @@ class Case:
     @property
     def held_out(self) -> bool:
         """Whether nothing may be tuned on the object."""
-        return self.object in HELD_OUT
+        return self.object in HELD_OUT or self.object in HELD_OUT_STRANGERS
+
+    @property
+    def is_hard(self) -> bool:
+        """Whether it is near the limit by the oracle."""
+        return self.id.rpartition("/")[2].startswith(HARD)
 
 
 def judge(
@@ -170,8 +182,14 @@ def hardened(case: Case) -> Case | None:
 
 def _settled(case: Case, other: Case) -> Case | None:
     """The case with its verdict, if that stands small changes of friction and not the other's."""
+    found = answered(case)
+    return None if found is None or judge(other).lifted == found.lifted else found
+
+
+def answered(case: Case) -> Case | None:
+    """The case with its verdict, if that stands small changes of friction."""
     verdict = judge(case)
-    if verdict.fouled or judge(other).lifted == verdict.lifted:
+    if verdict.fouled:
         return None
     for factor in (1.0 - MARGIN, 1.0 + MARGIN):
         found = judge(case, factor)
@@ -186,32 +204,45 @@ def with_friction(case: Case, friction: float, **changes: object) -> Case:
     return Case(**{**asdict(case), "friction": friction, **changes})
 
 
-def search(each: int, path: Path) -> None:
-    """Writes hard cases of all objects, so many of each, as they are found."""
+def find(name: str, each: int, seed: str) -> list[Case]:
+    """Cases of an object, so many if there are.
+
+    Args:
+        name: the object.
+        each: number of cases.
+        seed: HARD or ORDINARY.
+    """
+    settle = hardened if seed == HARD else answered
+    found = (case for case in map(settle, draw_cases(name, seed)) if case is not None)
+    return list(islice(found, each))
+
+
+def search(names: Sequence[str], seeds: Sequence[str], each: int, path: Path) -> None:
+    """Writes cases of objects, so many of each and each seed, as they are found."""
     cases: list[Case] = []
-    for name in (*TUNED, *HELD_OUT):
-        found: list[Case] = []
-        for drawn in draw_cases(name, "hard"):
-            case = hardened(drawn)
-            if case is not None:
-                found.append(case)
-                print(
-                    case.id, case.friction, case.mass, case.lifted, case.slip, case.tilt, flush=True
-                )
-            if len(found) == each:
-                break
-        print(f"{name}: {len(found)}, {sum(c.lifted for c in found)} of them lifted", flush=True)
-        cases += found
-        save_cases(cases, path)
+    with ProcessPoolExecutor(2) as pool:
+        jobs = [pool.submit(find, name, each, seed) for name in names for seed in seeds]
+        for job in jobs:
+            cases += job.result()
+            save_cases(cases, path)
+            print(f"{cases[-1].id}: {len(cases)} cases", flush=True)
 
 
 def main() -> None:
     """Searches and writes the list."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--each", type=int, default=4, help="cases of an object")
-    parser.add_argument("-o", "--output", type=Path, default=HARD_CASES)
+    parser.add_argument("--strangers", action="store_true", help="of the other objects")
+    parser.add_argument("-o", "--output", type=Path)
     arguments = parser.parse_args()
-    search(arguments.each, arguments.output)
+    if arguments.strangers:
+        found: tuple[Sequence[str], Sequence[str], Path] = (
+            tuple(STRANGERS), (HARD, ORDINARY), STRANGER_CASES,
+        )  # fmt: skip
+    else:
+        found = ((*TUNED, *HELD_OUT), (HARD,), HARD_CASES)
+    names, seeds, path = found
+    search(names, seeds, arguments.each, arguments.output or path)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from .arrays import Array, pose, rotation
 from .blocks import blocks
 from .lathe import arc, bent, hexagonal, lathe, line, polyline, stretched
 from .solid import MassProperties, Solid, mass_properties
+from .strangers import STRANGERS
 
 SPACING = 5e-4
 """Of samples that pads may touch [m]."""
@@ -60,10 +61,10 @@ def thing(name: str, spacing: float = SPACING) -> Thing:
     """An object by its name.
 
     Args:
-        name: of TUNED or HELD_OUT.
+        name: of TUNED, HELD_OUT or STRANGERS.
         spacing: of the samples for pads [m].
     """
-    make, poses = SHAPES[name]
+    make, poses = (SHAPES | STRANGERS)[name]
     solid = make(spacing)
     return Thing(solid, make(FEET), mass_properties(solid), poses)
 

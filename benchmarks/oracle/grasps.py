@@ -15,10 +15,11 @@ CONE = np.deg2rad(70.0)
 """Between the approach and straight down, at most."""
 TILTED = np.deg2rad(20.0)
 """Between the closing direction and the normals, at most."""
-WIDEST, NARROWEST = 0.074, 0.003
+WIDEST, NARROWEST = 0.074, 0.0015
 CLEAR = 1.5e-3
 """What is nearer to the open hand is not clear [m]."""
 TRIES = 3000
+ENDS = (np.argmin, np.argmax)
 BESIDE = 1e-3
 """A sample this near to a line is on it [m]."""
 
@@ -36,17 +37,17 @@ def draw_grasps(thing: Thing, pose_number: int, rng: np.random.Generator) -> Ite
     chances = solid.areas / solid.areas.sum()
     for _ in range(TRIES):
         first = int(rng.choice(len(chances), p=chances))
-        found = _opposite(solid.points, solid.normals, first)
-        if found is None:
-            continue
-        start, end = X_WO[:3, :3] @ solid.points[first], X_WO[:3, :3] @ solid.points[found]
-        X_WG = _hand(start + X_WO[:3, 3], end + X_WO[:3, 3], rng)
-        if X_WG is not None and is_clear(X_WG, feet_W):
-            yield np.linalg.inv(X_WO) @ X_WG
+        for found in _opposite(solid.points, solid.normals, first):
+            start, end = X_WO[:3, :3] @ solid.points[first], X_WO[:3, :3] @ solid.points[found]
+            X_WG = _hand(start + X_WO[:3, 3], end + X_WO[:3, 3], rng)
+            if X_WG is not None and is_clear(X_WG, feet_W):
+                yield np.linalg.inv(X_WO) @ X_WG
+                break
 
 
-def _opposite(points: Array, normals: Array, first: int) -> int | None:
-    """The farthest sample through the solid that a pad could press on at the same time."""
+def _opposite(points: Array, normals: Array, first: int) -> list[int]:
+    """Samples that the other pad could press on: on the other side of the wall, and of the whole
+    object, if that is another one."""
     n = normals[first]
     offset = points - points[first]
     along = -offset @ n
@@ -54,7 +55,9 @@ def _opposite(points: Array, normals: Array, first: int) -> int | None:
     fits = (beside < BESIDE) & (along > NARROWEST) & (along < WIDEST)
     fits &= normals @ n < -np.cos(TILTED)
     candidates = np.flatnonzero(fits)
-    return int(candidates[np.argmin(along[candidates])]) if len(candidates) else None
+    if not len(candidates):
+        return []
+    return list(dict.fromkeys(int(candidates[pick(along[candidates])]) for pick in ENDS))
 
 
 def _hand(start: Array, end: Array, rng: np.random.Generator) -> Array | None:
