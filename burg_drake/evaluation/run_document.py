@@ -289,7 +289,8 @@ def devices_of(document: RunDocument | CampaignDocument) -> list[str]:
     """Devices of a run with an engine with parallel trials, each once: that on which it began, and
     those of its sessions."""
     began = document.versions.get(DEVICE_ENTRY, "")
-    return [name for name in dict.fromkeys((began, *(s.device for s in document.stretches))) if name]
+    names = dict.fromkeys((began, *(session.device for session in document.stretches)))
+    return [name for name in names if name]
 
 
 def origin_of(document: RunDocument) -> TrialOrigin:

@@ -139,10 +139,10 @@ class CrashingJudge(KnownJudge):
     Attributes:
         how: by grasp id: `segfault`, `killed`, which another process does as the system does when
             memory runs out, `exit`, `error`, `hang`, `spin`, `memory`, which asks for more than it
-            may have, `parent`, which ends the parent process, `device`, which is an error of a card,
-            or `once` and `device_once`, which occur only as long as the file `log` does not exist;
-            `screen` and `screen_error` are `segfault` and `error`
-            in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
+            may have, `parent`, which ends the parent process, `device`, which is an error of a
+            card, or `once` and `device_once`, which occur only as long as the file `log` does not
+            exist; `screen` and `screen_error` are `segfault` and `error` in the stage `clear`,
+            `reach` and `reach_error` in the stage `reachable`.
     """
 
     how: tuple[tuple[str, str], ...] = ()

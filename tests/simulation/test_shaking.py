@@ -93,7 +93,9 @@ def test_an_untouched_body_stays_where_it_is_while_the_hand_moves(
         np.testing.assert_allclose(world.X_WB(body)[:3, 3], X_expected[:3, 3], atol=1e-3)
 
 
-def test_an_untouched_body_of_parallel_worlds_stays_where_it_is(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_untouched_body_of_parallel_worlds_stays_where_it_is(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Their kernels have formulas of their own. The strokes are quick, so that steps are few."""
     module = pytest.importorskip("burg_drake.simulation.batch.parallel_worlds")
     settings = ShakeSettings(
