@@ -104,7 +104,7 @@ def test_of_grasps_that_are_executed_together_a_death_costs_only_its_cause() -> 
 
 def test_a_card_that_fails_decides_nothing_about_grasps(tmp_path: Path) -> None:
     """Another worker judges them."""
-    judge = ParallelJudge(log=tmp_path / "failed", how=(("cube-0100", "device_once"),))
+    judge = ParallelJudge(log=tmp_path / "failed", how=(("cube-0100", "broken"),))
     judged = {c.id: v.outcome for c, v in judge_all(grasps(200), Make(judge), workers=2)}
     assert (tmp_path / "failed").exists()
     assert judged == {c.id: expected(c.id) for c in grasps(200)}
