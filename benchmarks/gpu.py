@@ -5,10 +5,10 @@
 Every object stands in SCENE (tabletop_six). The grasps are clear ones, every second one with less
 friction; if there are fewer than asked for, they are repeated. For each number of worlds a row has
 trials a second of the whole batch, from the grasps to their results, of which so many were executed
-on the CPU; grasps a second that one core feeds (screens, starts and results); and
-the memory in use on the card. M of the grasps are executed one by one by engines of the CPU, and
-ratios are to one core. On a card the kernels that take most of the time follow. The first batch, a
-small one, compiles the kernels, and is not counted.
+on the CPU; grasps a second that one core feeds (screens, starts and results); and the most memory
+in use on the card meanwhile, by all processes. M of the grasps are executed one by one by engines
+of the CPU, and ratios are to one core. On a card the kernels that take most of the time follow. The
+first batch, a small one, compiles the kernels, and is not counted.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections import defaultdict
+from importlib.metadata import version
 
 import numpy as np
 import warp as wp
@@ -50,7 +51,7 @@ def main() -> None:
     scene = burg.load_scene(arguments.scene)
     station = hand_only(burg.load_station(arguments.station))
     batch = BatchTrial(scene, station, device=arguments.device)
-    print(f"{batch.device}, MuJoCo Warp, Warp {wp.__version__}")
+    print(f"{batch.device}, MuJoCo Warp {version('mujoco-warp')}, Warp {wp.__version__}")
     for name in arguments.objects:
         X_OG = clear_grasps(batch.single, name, min(SAMPLED, arguments.grasps))
         friction = frictions(scene, name, len(X_OG))
@@ -83,15 +84,20 @@ def rates_one_by_one(
 
 def measure(batch: BatchTrial, name: str, X_OG: Array, friction: Array) -> float:
     """Prints a row; returns trials a second."""
+    used = [0.0]
+
+    def read_memory() -> None:
+        device = wp.get_device()  # That of the worlds, while they exist.
+        if device.is_cuda:
+            used.append((device.total_memory - device.free_memory) / 2**30)
+
     on_cpu, fed, start = batch.on_cpu, batch.feeding_time, time.perf_counter()
-    batch.run(name, X_OG, friction=friction)
+    batch.run(name, X_OG, friction=friction, progress=read_memory)
     wall = time.perf_counter() - start
     fed, on_cpu, n = batch.feeding_time - fed, batch.on_cpu - on_cpu, len(X_OG)
-    device = wp.get_device()
-    used = (device.total_memory - device.free_memory) / 2**30 if device.is_cuda else float("nan")
     print(
         f"{name}: {n} grasps in {batch.worlds} worlds: {n / wall:.1f} a second,"
-        f" {on_cpu} on the CPU; a core feeds {n / fed:.0f} a second; {used:.1f} GiB"
+        f" {on_cpu} on the CPU; a core feeds {n / fed:.0f} a second; {max(used):.1f} GiB"
     )
     return n / wall
 

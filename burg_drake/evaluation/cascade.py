@@ -34,7 +34,7 @@ from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
 from burg_drake.evaluation.judge import require_device, starting_note
 from burg_drake.evaluation.many_scenes import evaluate_scenes
 from burg_drake.evaluation.part_store import keep_parts
-from burg_drake.evaluation.run_document import add_session, begin_session
+from burg_drake.evaluation.run_document import WorkSession, add_session, begin_session
 from burg_drake.evaluation.run_folder import RUN_FILE, Run, require_run_folder, save_run
 from burg_drake.evaluation.run_preparation import (
     GraspsLike,
@@ -199,7 +199,10 @@ def _evaluate_one(
                 job = Job(scene.name, make_judge, run.candidates.at(left))
                 local = isinstance(executor, LocalExecutor)
                 note = starting_note(run.document.engine, request.settings.device) if local else ""
-                run = _judge_open_grasps(run, left, job, journal, executor, reporter, note)
+                session = begin_session(
+                    executor.workers, int(run.index.judged.sum()), request.device_text()
+                )
+                run = _judge_open_grasps(run, left, job, session, journal, executor, reporter, note)
                 require_judged(run)
                 hints = given_hints(run)
                 run = save_run(run.with_document(replace(run.document, hints=hints)))
@@ -217,6 +220,7 @@ def _judge_open_grasps(
     run: Run,
     left: NDArray[np.int64],
     job: Job,
+    session: WorkSession,
     journal: Journal,
     executor: Executor,
     reporter: Reporter,
@@ -228,7 +232,6 @@ def _judge_open_grasps(
     outcomes = run.index.count_outcomes(left)
     event = Progress(STARTING_PHASE, done, total, outcomes=outcomes, note=note)
     meter = ProgressMeter(reporter.show, event, "judging")
-    session = begin_session(executor.workers, int(run.index.judged.sum()))
     document = run.document
     save_run(run.with_document(add_session(document, session)))
     begun = time.monotonic()

@@ -7,6 +7,9 @@ A grasp that kills its worker (a crash inside Drake, or a time limit) is tried o
 a fresh process. If that dies too, the outcome is `simulation_failed` and the other grasps go on.
 The verdict records whether the last worker was killed from outside; a later call may then retry.
 
+A device that fails, such as a graphics card, decides nothing about grasps: its worker gets no more
+work, and the others take its grasps. If there is no other, the call ends with the device's error.
+
 Screens take many grasps at once, which costs a fraction of screening each. Only grasps that pass
 are handed out one by one. If a worker dies during a screening, its grasps go through the remaining
 stages one by one, to find the grasp that kills it.
@@ -27,6 +30,7 @@ from typing import Any, NamedTuple, Protocol
 
 from burg_drake.core import (
     BurgError,
+    DeviceError,
     Outcome,
     Session,
     SimulationError,
@@ -175,7 +179,8 @@ class OpenJob:
         to_judge: grasps to be judged one by one.
         to_screen: queue of each screen.
         batches: batch size of each screen.
-        halves: batches of a screen that killed a worker, in halves, which come first.
+        returned: batches that a screen takes again, before others: those that killed a worker, in
+            halves, and those whose device failed.
         crashes_in_a_row: number of grasps that killed their workers since one was judged.
         failed: whether the job is given up; later results are ignored.
     """
@@ -190,7 +195,7 @@ class OpenJob:
         )
         self.to_judge = GraspQueue(job.candidates)
         self.batches: tuple[ScreenSize, ...] = ()
-        self.halves: deque[tuple[PendingGrasp, ...]] = deque()
+        self.returned: deque[tuple[PendingGrasp, ...]] = deque()
         self.to_screen: list[GraspQueue] = []
         self.crashes_in_a_row = 0
         self.failed = False
@@ -198,7 +203,7 @@ class OpenJob:
     @property
     def waiting(self) -> int:
         """Number of grasps not handed to a worker."""
-        return len(self.to_judge) + sum(map(len, self.to_screen)) + sum(map(len, self.halves))
+        return len(self.to_judge) + sum(map(len, self.to_screen)) + sum(map(len, self.returned))
 
     def set_screens(self, batches: tuple[ScreenSize, ...]) -> None:
         """Sets the screens once the first worker reports them; until then no grasp is screened."""
@@ -214,8 +219,8 @@ class OpenJob:
         grasps wait for it. Screening and judging thus alternate, so that the rate of verdicts
         predicts the remaining time.
         """
-        if self.halves:
-            return self.halves.popleft(), True
+        if self.returned:
+            return self.returned.popleft(), True
         if len(self.to_judge) < GRASPS_PER_TASK:
             for k in reversed(range(len(self.batches))):
                 queue, size = self.to_screen[k], self.batches[k].batch
@@ -242,7 +247,20 @@ class OpenJob:
         self.failed = True
         self.to_judge = GraspQueue()
         self.to_screen = []
-        self.halves.clear()
+        self.returned.clear()
+
+    def take_back(self, grasps: tuple[PendingGrasp, ...], *, screening: bool) -> None:
+        """Queues grasps again that a worker could not judge, through no fault of theirs.
+
+        Args:
+            grasps: the grasps.
+            screening: whether they were screened together.
+        """
+        if screening:
+            self.returned.append(grasps)
+            return
+        for grasp in grasps:
+            self.to_judge.append(grasp)
 
     def executes(self, grasps: Sequence[PendingGrasp]) -> bool:
         """Whether the next screen of these grasps executes them."""
@@ -255,7 +273,7 @@ class OpenJob:
         few = 64
         if self.executes(grasps) and len(grasps) > few:
             half = len(grasps) // 2
-            self.halves += [grasps[:half], grasps[half:]]
+            self.returned += [grasps[:half], grasps[half:]]
             return
         for grasp in grasps:
             self.to_judge.append(grasp)
@@ -295,12 +313,14 @@ class WorkerSlot:
         job: current or last job of the worker.
         assigned: work that it has not finished yet.
         started: whether the worker was ever given work.
+        device_failed: whether its device failed; it gets no more work.
     """
 
     number: int
     job: OpenJob | None = None
     assigned: list[AssignedWork] = field(default_factory=list)
     started: bool = False
+    device_failed: bool = False
 
 
 JudgedGrasp = tuple[Job, Candidate, Verdict]
@@ -365,7 +385,8 @@ class JudgePool:
 
     def assign_work(self) -> None:
         """Gives work to idle workers, first to those whose process has started."""
-        for slot in sorted(self.slots, key=lambda slot: not slot.started):
+        usable = [slot for slot in self.slots if not slot.device_failed]
+        for slot in sorted(usable, key=lambda slot: not slot.started):
             if not slot.assigned and (job := self.choose_job(slot)) is not None:
                 self.give_work(slot, job)
         open_jobs = [job for job in self.jobs if not job.failed]
@@ -445,6 +466,8 @@ class JudgePool:
         error = future.exception()
         if error is not None and error is job.session.error:
             self.fail_job(job, _build_error(error))
+        elif isinstance(error, DeviceError):
+            self.retire_worker(work, error)
         elif not work.grasps:
             if error is None:
                 self._screens[job.job.key] = future.result()
@@ -460,6 +483,17 @@ class JudgePool:
             yield job.job, work.grasps[0][0], future.result()
         else:
             yield from self.handle_crash(work, error)
+
+    def retire_worker(self, work: AssignedWork, error: DeviceError) -> None:
+        """Gives no more work to a worker whose device failed, and its grasps to others.
+
+        Raises:
+            DeviceError: there is no other worker.
+        """
+        work.job.take_back(work.grasps, screening=work.screening)
+        work.slot.device_failed = True
+        if all(slot.device_failed for slot in self.slots):
+            raise error
 
     def handle_crash(self, work: AssignedWork, error: BaseException) -> Iterator[JudgedGrasp]:
         """Yields `simulation_failed` for a grasp that killed its workers.
@@ -561,6 +595,7 @@ class Executor(Protocol):
 
         Raises:
             BurgError: a job cannot be done, and there is no `on_failure`; see `judge_all`.
+            DeviceError: the devices of all workers failed.
         """
 
 
@@ -624,6 +659,7 @@ def judge_all(
         BurgError: the judge cannot be built.
         SimulationError: workers die while the judge is built, or at `WorkerLimits.hopeless` grasps
             in a row.
+        DeviceError: the devices of all workers failed.
     """
     executor = LocalExecutor.of_this_machine(workers, limits)
     with closing(executor.judge([Job("", make_judge, candidates)])) as answers:

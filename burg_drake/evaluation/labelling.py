@@ -11,9 +11,12 @@ import numpy as np
 from burg_drake.core import (
     Array,
     BurgError,
+    ClusterError,
+    DeviceError,
     GraspSet,
     InvalidInputError,
     Listener,
+    MissingDependencyError,
     Pose,
     UnknownNameError,
     ensure_writable_folder,
@@ -106,6 +109,8 @@ def label_library(
             folder with labels by other settings.
         UnknownNameError: there is no such object or format.
         MissingDependencyError: the engine is not installed.
+        DeviceError: the cards fail.
+        ClusterError: the cluster is lost.
     """
     settings, station, folder = settings or EvaluationSettings(), as_station(station), Path(out)
     names, target = _chosen_objects(library, settings.only, grasps), format_named(format)
@@ -116,16 +121,16 @@ def label_library(
         )
     settings = _labelling_settings(settings)
     RunRequest.of(station, settings)
-    if executor is None:
+    runs = {name: folder / LABELLING_RUNS_FOLDER / name for name in names}
+    new = {name for name, run_folder in runs.items() if not (run_folder / RUN_FILE).exists()}
+    if executor is None and new:
         require_device(as_engine(settings.engine), settings.device)
     ensure_writable_folder(folder)
-    for name in names:
-        run_folder = folder / LABELLING_RUNS_FOLDER / name
+    for name, run_folder in runs.items():
         path = folder / LABELLING_SCENES_FOLDER / f"{name}.yaml"
-        is_new = not (run_folder / RUN_FILE).exists()
         try:
             scene = single_object_scene(library, name, station, settings.protocol, path)
-            if is_new:
+            if name in new:
                 ensure_writable_folder(path.parent)
                 save_scene(scene.document, path)
             run = evaluate(
@@ -141,7 +146,7 @@ def label_library(
             found, file = run_grasps(run), folder / f"{name}{target.suffixes[0]}"
             notes = target.write(found, file, station_gripper(station)) if len(found) else ()
         except BurgError as error:
-            if not is_new:  # other settings, which concern all objects
+            if _concerns_all(error):
                 raise
             nothing = np.empty(0)
             yield ObjectLabels(object=name, success=nothing, given=nothing, error=str(error))
@@ -154,6 +159,14 @@ def label_library(
             path=file if len(found) else None,
             notes=notes,
         )
+
+
+def _concerns_all(error: BurgError) -> bool:
+    """Whether an error is not about an object: its folder holds labels by other settings, or what
+    judges the grasps is missing or lost."""
+    if isinstance(error, (DeviceError, ClusterError, MissingDependencyError)):
+        return True
+    return not {"out", "device", "engine"}.isdisjoint(error.arguments)
 
 
 def single_object_scene(

@@ -338,7 +338,8 @@ class _CampaignCall:
         known = self._known_outcomes()
         event = Progress(STARTING_PHASE, done, sum(self.expected.values()), outcomes=known)
         self.meter = ProgressMeter(self.reporter.show, event, "judging")
-        session = begin_session(self.executor.workers, known.total())
+        device = self.request.device_text()
+        session = begin_session(self.executor.workers, known.total(), device)
         save_campaign(Campaign(self.folder, add_session(document, session)))
         begun = time.monotonic()
         try:

@@ -101,6 +101,8 @@ class WorkSession:
         before: number of grasps that were finished before.
         judged: number of grasps finished by this call; left out if it was killed.
         seconds: duration [s]; left out if it was killed.
+        device: devices of an engine with parallel trials; left out for other engines and on a
+            cluster.
     """
 
     started: str
@@ -108,6 +110,7 @@ class WorkSession:
     before: int | None = None
     judged: int | None = None
     seconds: float | None = None
+    device: str = ""
 
     def finish(self, judged: int, begun: float) -> WorkSession:
         """The finished session, given its judged grasps and its start by `time.monotonic`."""
@@ -276,10 +279,18 @@ def add_session(document: OneRunDocument, session: WorkSession) -> OneRunDocumen
     return replace(document, stretches=(*document.stretches, session))
 
 
-def begin_session(workers: int, before: int) -> WorkSession:
+def begin_session(workers: int, before: int, device: str = "") -> WorkSession:
     """A session that begins now; `before` is the number of grasps that have a verdict."""
     started = datetime.now(UTC).isoformat(timespec="seconds")
-    return WorkSession(started=started, workers=workers, before=before)
+    return WorkSession(started=started, workers=workers, before=before, device=device)
+
+
+def devices_of(document: RunDocument | CampaignDocument) -> list[str]:
+    """Devices of a run with an engine with parallel trials, each once: that on which it began, and
+    those of its sessions."""
+    began = document.versions.get(DEVICE_ENTRY, "")
+    names = dict.fromkeys((began, *(session.device for session in document.stretches)))
+    return [name for name in names if name]
 
 
 def origin_of(document: RunDocument) -> TrialOrigin:

@@ -286,20 +286,20 @@ class RunRequest:
             "shard": "" if self.shard is None else str(self.shard),
             "table": self.settings.table,
             "versions": software_versions({**JUDGING_PACKAGES, **self.engine.packages})
-            | self.devices(),
+            | ({DEVICE_ENTRY: device} if (device := self.device_text()) else {}),
         }
 
-    def devices(self) -> dict[str, str]:
-        """The devices of this machine on which an engine with parallel trials runs, as an entry of
-        the versions; none if a cluster has them."""
+    def device_text(self) -> str:
+        """The devices of this machine on which an engine with parallel trials runs; empty if there
+        are none, or a cluster has them."""
         if not self.engine.parallel or not self.local:
-            return {}
+            return ""
         from burg_drake.simulation import describe_devices, find_devices
 
         try:
-            return {DEVICE_ENTRY: describe_devices(find_devices(self.settings.device))}
+            return describe_devices(find_devices(self.settings.device))
         except InvalidInputError:
-            return {}
+            return ""
 
     def document(self, folder: Path, scene: Scene) -> RunDocument:
         """Document of a run; counts and hash of the grasps are filled in later."""

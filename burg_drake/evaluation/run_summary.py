@@ -34,6 +34,7 @@ from burg_drake.evaluation.outcome_counts import (
     stage_cost,
 )
 from burg_drake.evaluation.results_table import TextValues, contested_rows
+from burg_drake.evaluation.run_document import devices_of
 from burg_drake.evaluation.run_folder import Run
 from burg_drake.evaluation.trial_origin import protocol_of, read_motion
 from burg_drake.station import GraspMotion
@@ -52,8 +53,8 @@ def run_notes(run: Run) -> tuple[str, ...]:
     """Notes on a run, one sentence each.
 
     They name usual mistakes in given grasps, instances with fewer grasps than asked for or with
-    none given and, once its grasps are judged, each object without executed grasps, or with too few
-    lifted or failing grasps for a balanced run.
+    none given, several devices and, once its grasps are judged, each object without executed
+    grasps, or with too few lifted or failing grasps for a balanced run.
     """
     grasps = run.document.grasps
     missing = ""
@@ -65,6 +66,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
         *([missing] if missing else []),
         *run_shortfall_notes(run),
         *_protocol_notes(run),
+        *_device_notes(run),
         *_unexecuted_notes(run),
         *_balance_notes(run),
     )
@@ -77,6 +79,17 @@ def _protocol_notes(run: Run) -> list[str]:
     return [
         "objects were shaken, alone and without gravity: here `lifted` means held to the end, and"
         " `slipped` lost before"
+    ]
+
+
+def _device_notes(run: Run) -> list[str]:
+    """A note on a run that was continued on another device."""
+    devices = devices_of(run.document)
+    if len(devices) < 2:
+        return []
+    return [
+        f"the grasps were judged on {len(devices)} devices, whose results may differ by rounding:"
+        f" {'; '.join(devices)}"
     ]
 
 

@@ -78,7 +78,7 @@ class SceneJudging:
         ids = run.candidates.id
         self._failed = {ids[row]: bool(index.interrupted[row]) for row in failed}
         self._judged = 0
-        self._workers = workers
+        self._workers, self._device = workers, request.device_text()
         self._candidate_count = len(self._run.candidates)
         self._shortfall_notes = "; ".join(run_shortfall_notes(self._run))
         self._run = Run(folder, self._run.document)
@@ -90,7 +90,7 @@ class SceneJudging:
 
     def begin(self) -> None:
         """Records in the run's document that a session begins."""
-        self._session = begin_session(self._workers, self._judged_before)
+        self._session = begin_session(self._workers, self._judged_before, self._device)
         self._begun = time.monotonic()
         self._save(self._session)
 

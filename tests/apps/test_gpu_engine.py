@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from burg_drake.apps import main
 from burg_drake.core import GraspSet
-from burg_drake.evaluation import Run, load_run
+from burg_drake.evaluation import Run, load_run, run_notes
 
 warp = pytest.importorskip("warp")
 
@@ -58,6 +59,26 @@ def test_a_run_that_is_complete_returns_at_once(gpu_run: Run, arguments: list[st
     given = [*arguments, "-o", str(gpu_run.path), "--engine", "mujoco-gpu"]
     assert main(given) == 0
     assert gpu_run.table_path.stat().st_mtime_ns == before
+
+
+def test_a_run_that_goes_on_with_another_device_says_so(
+    gpu_run: Run, arguments: list[str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(gpu_run.path, folder)
+    document, journal = folder / "run.yaml", folder / "journal.jsonl"
+    document.write_text(document.read_text().replace("device: cpu", "device: NVIDIA H100"))
+    journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:-1]))
+    begun = load_run(folder)
+    assert len(begun.left) == 1 and not any("devices" in note for note in run_notes(begun))
+    given = [*arguments, "-o", str(folder), "--engine", "mujoco-gpu", "--device", "cpu"]
+    assert main(given) == 0
+    run = load_run(folder)
+    assert [session.device for session in run.document.stretches] == ["NVIDIA H100", "cpu"]
+    assert run.results["outcome"].tolist() == gpu_run.results["outcome"].tolist()
+    note = "judged on 2 devices, whose results may differ by rounding: NVIDIA H100; cpu"
+    assert any(note in one for one in run_notes(run))
+    assert note in re.sub(r"<[^>]*>", "", run.report_path.read_text())
 
 
 def test_replayed_on_the_cpu_which_is_said(gpu_run: Run, tmp_path: Path, capsys: Capture) -> None:

@@ -19,7 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core import InvalidInputError, Outcome, Stage
+from burg_drake.core import DeviceError, InvalidInputError, Outcome, Stage
 from burg_drake.evaluation import Candidate, Decide, Decision, Screen
 
 JUDGE_FACTORY = "burg_drake.evaluation.run_preparation.StationJudgeFactory"
@@ -139,9 +139,11 @@ class CrashingJudge(KnownJudge):
     Attributes:
         how: by grasp id: `segfault`, `killed`, which another process does as the system does when
             memory runs out, `exit`, `error`, `hang`, `spin`, `memory`, which asks for more than it
-            may have, `parent`, which ends the parent process, or `once`, which crashes only as long
-            as the file `log` does not exist; `screen` and `screen_error` are `segfault` and `error`
-            in the stage `clear`, `reach` and `reach_error` in the stage `reachable`.
+            may have, `parent`, which ends the parent process, `device`, which is an error of a
+            card, `broken`, after which the first process that meets it has that error at all
+            grasps, or `once`, which crashes only as long as the file `log` does not exist; `screen`
+            and `screen_error` are `segfault` and `error` in the stage `clear`, `reach` and
+            `reach_error` in the stage `reachable`.
     """
 
     how: tuple[tuple[str, str], ...] = ()
@@ -169,9 +171,15 @@ class CrashingJudge(KnownJudge):
             case "parent":
                 os.kill(os.getppid(), signal.SIGKILL)
                 time.sleep(3600.0)
+            case "device":
+                raise DeviceError("device cuda:0 failed")
+            case "broken" if self.log is not None and not self.log.exists():
+                self.log.write_text(str(os.getpid()))
             case "once" if self.log is not None and not self.log.exists():
                 self.log.touch()
                 os.kill(os.getpid(), signal.SIGKILL)
+        if self.log is not None and self.log.exists() and self.log.read_text() == str(os.getpid()):
+            raise DeviceError("device cuda:0 failed")
         return super().execute(grasp)
 
     def clear(self, grasp: Candidate) -> Decision:

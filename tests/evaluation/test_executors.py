@@ -22,8 +22,15 @@ from known_judge import (
     refuse,
 )
 
-from burg_drake.core import InvalidInputError, Outcome, SimulationError, Stage
-from burg_drake.evaluation import Candidate, WorkerLimits, judge_all
+from burg_drake.core import DeviceError, InvalidInputError, Outcome, SimulationError, Stage
+from burg_drake.evaluation import (
+    Candidate,
+    Job,
+    JobFailed,
+    LocalExecutor,
+    WorkerLimits,
+    judge_all,
+)
 
 
 def grasps(n: int) -> list[Candidate]:
@@ -93,6 +100,30 @@ def test_of_grasps_that_are_executed_together_a_death_costs_only_its_cause() -> 
     assert failed == ["cube-0100"]
     others = {c.id: expected(c.id) for c in grasps(200) if c.id != "cube-0100"}
     assert {id: v.outcome for id, v in judged.items() if id not in failed} == others
+
+
+def test_a_card_that_fails_decides_nothing_about_grasps(tmp_path: Path) -> None:
+    """Another worker judges them."""
+    judge = ParallelJudge(log=tmp_path / "failed", how=(("cube-0100", "broken"),))
+    judged = {c.id: v.outcome for c, v in judge_all(grasps(200), Make(judge), workers=2)}
+    assert (tmp_path / "failed").exists()
+    assert judged == {c.id: expected(c.id) for c in grasps(200)}
+
+
+def test_a_call_ends_with_its_last_card_and_keeps_what_is_judged() -> None:
+    bad = [Candidate(f"bad-{i:04d}", "cube", np.eye(4)) for i in range(80)]
+    failing = ParallelJudge(how=tuple((grasp.id, "device") for grasp in bad))
+    jobs = [Job("good", Make(ParallelJudge()), grasps(20)), Job("bad", Make(failing), bad)]
+    judged: list[str] = []
+    with pytest.raises(DeviceError, match=r"^device cuda:0 failed$"):
+        for _, candidate, verdict in LocalExecutor(1).judge(jobs, failures_are_unexpected):
+            assert verdict.outcome is expected(candidate.id)
+            judged.append(candidate.id)
+    assert sorted(judged) == [c.id for c in grasps(20)]
+
+
+def failures_are_unexpected(failure: JobFailed) -> None:
+    raise AssertionError(failure.job.key)
 
 
 def test_grasps_are_screened_together_and_once(tmp_path) -> None:

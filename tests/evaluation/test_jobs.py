@@ -8,9 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, die, expected, refuse
+from known_judge import (
+    CrashingJudge,
+    KnownJudge,
+    Make,
+    MakeAndTell,
+    ParallelJudge,
+    die,
+    expected,
+    refuse,
+)
 
-from burg_drake.core import InvalidInputError, Outcome
+from burg_drake.core import DeviceError, InvalidInputError, Outcome
 from burg_drake.evaluation import (
     Candidate,
     Job,
@@ -133,3 +142,16 @@ def test_workers_without_one_get_few_and_lost_ones_alone(scene, station) -> None
     assert len(lost.items) == 32
     assert not list(job.retry_alone(lost))
     assert [len(job.take_chunk(1).items) for _ in range(33)] == [*[1] * 32, 32]
+
+
+def test_a_card_that_fails_on_a_cluster_fails_the_job_and_decides_nothing() -> None:
+    """A child judges in the process of its Dask worker."""
+    tasks = pytest.importorskip("burg_drake.evaluation.cluster.worker_tasks")
+    children = tasks.Supervisor("run")
+    children.setup(None)
+    judge = ParallelJudge(how=(("a-0001", "device"),))
+    sent = Job("a", Make(judge), grasps("a", 3))
+    answer = children.judge(sent, WorkerLimits())
+    children.teardown(None)
+    assert isinstance(answer.error, DeviceError) and not answer.verdicts
+    assert str(answer.error).startswith("device cuda:0 failed, on ")

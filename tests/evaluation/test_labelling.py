@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core import InvalidInputError, Outcome, Pose, UnknownNameError
+from burg_drake.core import (
+    ClusterError,
+    DeviceError,
+    InvalidInputError,
+    MissingDependencyError,
+    Outcome,
+    Pose,
+    SimulationError,
+    UnknownNameError,
+)
 from burg_drake.evaluation import (
     EvaluationSettings,
     ObjectLabels,
@@ -108,6 +118,63 @@ def test_the_same_call_goes_on_where_it_stopped(
     with pytest.raises(InvalidInputError, match="; protocol is lift there, shake here"):
         next(label_library(library, station, out, settings=other, workers=1, progress=False))
     assert (out / "scenes" / "cube.yaml").read_text() == scene
+
+
+def test_errors_of_an_object_do_not_stop_the_others_and_those_of_the_machine_do(
+    library: ObjectLibrary,
+    station: Station,
+    judged_here: None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not in a second call either, when the object's run exists."""
+
+    def label() -> list[ObjectLabels]:
+        settings = replace(SETTINGS, only=("cube", "heavy"), grasps_per_object=1)
+        return list(label_library(library, station, tmp_path, settings=settings, progress=False))
+
+    def fail_with(error: Exception) -> None:
+        def evaluate_but_cube(scene, station, folder, **more):
+            run = evaluate(scene, station, folder, **more)
+            if folder.name == "cube":
+                raise error
+            return run
+
+        monkeypatch.setattr("burg_drake.evaluation.labelling.evaluate", evaluate_but_cube)
+
+    fail_with(SimulationError("50 grasps in a row could not be simulated"))
+    for _ in range(2):
+        cube, heavy = label()
+        assert "50 grasps in a row" in cube.error and cube.run is None
+        assert heavy.path is not None and not heavy.error
+    shutil.rmtree(tmp_path / "runs")  # The first error meets a new object.
+    for kind in (DeviceError, ClusterError, MissingDependencyError):
+        fail_with(kind("it is lost"))
+        with pytest.raises(kind, match="it is lost"):
+            label()
+
+
+def test_complete_labels_need_no_card(
+    labelled: list[ObjectLabels],
+    library: ObjectLibrary,
+    station: Station,
+    judged_here: None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> None:
+        raise InvalidInputError("there is no card")
+
+    monkeypatch.setattr("burg_drake.evaluation.labelling.require_device", refuse)
+
+    def label(out: Path) -> list[ObjectLabels]:
+        more = {"format": "acronym", "settings": SETTINGS, "progress": False}
+        return list(label_library(library, station, out, **more))
+
+    out = labelled[0].path.parent
+    again = label(out)
+    assert [found.path for found in again] == [found.path for found in labelled]
+    with pytest.raises(InvalidInputError, match="there is no card"):
+        label(out.parent / "new")
 
 
 def test_given_grasps_keep_their_labels_beside_the_new_ones(

@@ -6,9 +6,12 @@ the order of contacts around.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict, fields, replace
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,7 @@ from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, PAD, from_above, lifti
 
 from burg_drake.core import (
     Array,
+    DeviceError,
     InvalidInputError,
     MissingDependencyError,
     Outcome,
@@ -33,6 +37,9 @@ from burg_drake.simulation import (
     ShakeSettings,
     TrialResult,
     TrialSettings,
+    describe_devices,
+    find_devices,
+    kernels_are_compiled,
 )
 from burg_drake.station import ENGINES, GraspMotion, Obstacle
 from tests.thorough import thorough
@@ -331,20 +338,24 @@ def test_the_same_bits_alone_and_among_others_in_any_order(
     assert exact(alone) == exact(results[5])
 
 
-def turned(collision: Callable[[Any, Any], None]) -> Callable[[Any, Any], None]:
+def turned(collision: Callable[..., None]) -> Callable[..., None]:
     """Finds collisions, in the opposite order."""
 
-    def collide(model: Any, data: Any) -> None:
-        collision(model, data)
-        contact = data.contact
-        for field in fields(contact):
-            values = getattr(contact, field.name)
-            if getattr(values, "shape", (0,))[0] == data.naconmax:
-                words = flat_words(values)
-                before = wp.clone(words)
-                wp.launch(turn, dim=words.shape, inputs=[data.nacon, before], outputs=[words])
+    def collide(model: Any, data: Any, **more: Any) -> None:
+        collision(model, data, **more)
+        turn_contacts(data)
 
     return collide
+
+
+def turn_contacts(data: Any) -> None:
+    """Reverses the order of the contacts."""
+    for field in fields(data.contact):
+        values = getattr(data.contact, field.name)
+        if getattr(values, "shape", (0,))[0] == data.naconmax:
+            words = flat_words(values)
+            before = wp.clone(words)
+            wp.launch(turn, dim=words.shape, inputs=[data.nacon, before], outputs=[words])
 
 
 def flat_words(values: Any) -> Any:
@@ -362,21 +373,55 @@ def turn(nacon: wp.array(dtype=int), before: wp.array2d(dtype=int), after: wp.ar
         after[i, k] = before[n - 1 - i, k]
 
 
+TURNED_ROWS = [5, 7]
+"""Grasps in which the order of contacts matters."""
+
+
+def bits(scene: Scene, columns) -> list[dict[str, str]]:
+    """Results of `TURNED_ROWS`."""
+    X_OG, friction, _ = columns
+    found = batch_of(scene).run("box", X_OG[TURNED_ROWS], friction=friction[TURNED_ROWS])
+    return [exact(result) for result in found]
+
+
 def test_the_same_bits_whatever_the_order_of_contacts(
     scene: Scene, columns, results: list[TrialResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without `fixed_order` they are others. If not, MuJoCo Warp has learned it, and this room can
-    do without."""
     from mujoco_warp._src import collision_driver
 
-    X_OG, friction, _ = columns
-    rows = [5, 7]
     monkeypatch.setattr(collision_driver, "collision", turned(collision_driver.collision))
-    other = batch_of(scene).run("box", X_OG[rows], friction=friction[rows])
-    assert [exact(result) for result in other] == [exact(results[k]) for k in rows]
+    assert bits(scene, columns) == [exact(results[k]) for k in TURNED_ROWS]
+
+
+@pytest.mark.parametrize("sorts", [False, True])
+def test_without_a_fixed_order_bits_depend_on_that_of_contacts(
+    scene: Scene, columns, monkeypatch: pytest.MonkeyPatch, sorts: bool
+) -> None:
+    """Also if MuJoCo Warp is asked to sort them. Once this fails, it has learned a fixed order, and
+    `fixed_order` can go."""
+    from mujoco_warp._src import collision_driver
+    from mujoco_warp._src.types import DeterminismType
+
     monkeypatch.setattr(parallel_worlds, "fixed_order", lambda data: nullcontext())
-    loose = batch_of(scene).run("box", X_OG[rows], friction=friction[rows])
-    assert [exact(result) for result in loose] != [exact(result) for result in other]
+    sort, put_model = collision_driver._sort_contacts, mujoco_warp.put_model
+
+    def put_model_that_sorts(*args: Any, **kwargs: Any) -> Any:
+        model = put_model(*args, **kwargs)
+        model.opt.deterministic = DeterminismType.CONTACTS | DeterminismType.CONSTRAINT
+        return model
+
+    def turn_and_sort(model: Any, data: Any) -> None:
+        turn_contacts(data)
+        sort(model, data)
+
+    if sorts:
+        monkeypatch.setattr(mujoco_warp, "put_model", put_model_that_sorts)
+    found = bits(scene, columns)
+    if sorts:
+        monkeypatch.setattr(collision_driver, "_sort_contacts", turn_and_sort)
+    else:
+        monkeypatch.setattr(collision_driver, "collision", turned(collision_driver.collision))
+    assert bits(scene, columns) != found
 
 
 def test_worlds_without_room_for_their_contacts_run_again(
@@ -395,6 +440,105 @@ def test_worlds_without_room_for_their_contacts_run_again(
     (result,) = batch_of(scene).run("box", X_OG[[4]], friction=friction[[4]])
     assert exact(result) == exact(results[4])
     assert 64 in rooms and max(rooms) >= 256
+
+
+def test_trials_that_fit_into_no_room_are_executed_on_the_cpu(
+    scene: Scene, columns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Narrow(parallel_worlds.Room):
+        def __init__(self, rows: int = 64, contacts: int = 24) -> None:
+            super().__init__(64, 24)
+
+    monkeypatch.setattr(parallel_worlds, "Room", Narrow)
+    X_OG, friction, _ = columns
+    batch = batch_of(scene)
+    (result,) = batch.run("box", X_OG[[4]], friction=friction[[4]])
+    assert batch.on_cpu == 1
+    assert exact(result) == exact(batch.single.run("box", X_OG[4], friction=float(friction[4])))
+
+
+# --- the device -----------------------------------------------------------------------------------
+
+
+def test_where_memory_is_short_there_are_fewer_worlds_from_then_on(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[int] = []
+    make_data, room_for = mujoco_warp.make_data, 10
+
+    def make_some(model: Any, nworld: int, **more: Any) -> Any:
+        made.append(nworld)
+        if nworld > room_for:
+            raise RuntimeError("Failed to allocate 4 bytes on device 'cuda:0'")
+        return make_data(model, nworld=nworld, **more)
+
+    monkeypatch.setattr(mujoco_warp, "make_data", make_some)
+    missed = np.tile(from_above(0.12), (40, 1, 1))
+    batch = batch_of(scene, worlds=40)
+    rounds = []
+    for _ in range(3):
+        made.clear()
+        results = batch.run("box", missed)
+        assert {result.outcome for result in results} == {Outcome.NO_CONTACT}
+        rounds.append(tuple(made))
+    assert rounds[0] == (40, 20, 10)
+    assert rounds[2] == (10,)
+    room_for = 0
+    with pytest.raises(DeviceError, match="device cpu failed: RuntimeError: Failed to allocate"):
+        batch.run("box", missed)
+
+
+def test_kernels_are_replaced_for_one_batch_at_a_time() -> None:
+    """Else the one that leaves last would leave those of the other behind."""
+    from mujoco_warp._src import solver
+
+    original, data = solver._update_gradient_grad, SimpleNamespace(nworld=1, njmax=3)
+    entered = threading.Event()
+
+    def enter() -> None:
+        with parallel_worlds.fixed_order(data):
+            entered.set()
+
+    other = threading.Thread(target=enter)
+    with wp.ScopedDevice("cpu"), parallel_worlds.fixed_order(data):
+        other.start()
+        assert not entered.wait(0.2)
+        assert solver._update_gradient_grad is not original
+    other.join(10.0)
+    assert entered.is_set() and solver._update_gradient_grad is original
+
+
+def test_kernels_are_compiled_once_a_batch_has_run(
+    scene: Scene, results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not yet if only those of trials are: MuJoCo Warp's take longer, and come later."""
+    (device,) = find_devices("cpu")
+    assert kernels_are_compiled(device)
+    module = wp.get_module(parallel_worlds.trial_kernels.__name__).get_module_identifier()
+    (tmp_path / module).mkdir()
+    (tmp_path / module / f"{module}.o").touch()
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    assert not kernels_are_compiled(device)
+
+
+def test_an_old_driver_matters_to_cards_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    card, cpu = (SimpleNamespace(alias=a, is_cuda=a != "cpu") for a in ("cuda:0", "cpu"))
+    monkeypatch.setattr(wp, "get_devices", lambda: [cpu, card])
+    monkeypatch.setattr(wp, "is_conditional_graph_supported", lambda: False)
+    assert find_devices("cpu") == [cpu]
+    for name in (None, "cuda:0"):
+        with pytest.raises(InvalidInputError, match=r"driver that supports CUDA 12\.4 or later"):
+            find_devices(name)
+
+
+def test_cards_are_described_with_what_their_driver_supports(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    card = SimpleNamespace(name="NVIDIA H100", is_cuda=True)
+    monkeypatch.setattr(wp, "get_cuda_driver_version", lambda: (12, 8))
+    monkeypatch.setattr(wp, "get_cuda_toolkit_version", lambda: (12, 9))
+    told = "NVIDIA H100 (driver supports CUDA 12.8, Warp is built with CUDA 12.9)"
+    assert describe_devices([card, card]) == told
 
 
 # --- refusals -------------------------------------------------------------------------------------

@@ -22,6 +22,7 @@ from burg_drake.core import (
 from burg_drake.scene import Instance, Scene
 from burg_drake.simulation import (
     NO_GRIP_LIMITS,
+    BatchTrial,
     HandTrial,
     MujocoTrial,
     ShakeCarrier,
@@ -59,6 +60,21 @@ def shaken(
 # --- the forces -----------------------------------------------------------------------------------
 
 
+def seen_from_the_hand(settings: ShakeSettings, share: float) -> Array:
+    """Pose (4, 4) of a hand after a share of a period, in that at the start, from the definition of
+    a stroke; for one period, and a closing axis that keeps its sense."""
+    omega = 2.0 * np.pi * settings.shake_frequency
+    stroke = (1.0 - np.cos(2.0 * np.pi * share)) / omega**2
+    if share <= 1.0:
+        return make_pose(p_AB=(0.0, 0.0, settings.shake_acceleration * stroke))
+    turn = settings.turn_acceleration * stroke
+    return make_pose(Rotation.from_rotvec((turn, 0.0, 0.0)).as_matrix())
+
+
+UNTOUCHED = from_above(0.35, yaw=0.4)
+"""A hand above the box, whose closing axis is cos(0.4) along the x axis of the box."""
+
+
 @pytest.mark.parametrize("engine", ENGINES_TO_SHAKE)
 def test_an_untouched_body_stays_where_it_is_while_the_hand_moves(
     scene: Scene, engine: str
@@ -66,27 +82,55 @@ def test_an_untouched_body_stays_where_it_is_while_the_hand_moves(
     """Seen from the hand it moves as the hand does, the other way."""
     settings = ShakeSettings(shake_periods=1)
     trial = shaken(scene, engine, step=1e-4, shake_periods=1)
-    X_OG = from_above(0.35, yaw=0.4)
-    world, X_WO = begin(trial, X_OG)
+    world, X_WO = begin(trial, UNTOUCHED)
     body = world.free["box"]
     X_WG, carrier = world.X_WG(), ShakeCarrier(world, body)
-    period = 1.0 / settings.shake_frequency
-    omega = 2.0 * np.pi / period
-    up, turn = (
-        2.0 * strength / omega**2
-        for strength in (settings.shake_acceleration, settings.turn_acceleration)
-    )
     carrier.lift(0, 0)
     for share in (0.25, 0.5, 1.0, 1.25, 1.5, 2.0):
-        carrier.advance_to(share * period)
-        stroke = 0.5 * (1.0 - np.cos(omega * share * period))
-        X_GG = make_pose(p_AB=(0.0, 0.0, up * stroke))
-        if share > 1.0:
-            # The closing axis is cos(0.4) along the x axis of the object, so it keeps its sense.
-            X_GG = make_pose(Rotation.from_rotvec((turn * stroke, 0.0, 0.0)).as_matrix())
-        X_expected = X_WG @ inverse(X_GG) @ inverse(X_WG) @ X_WO
+        carrier.advance_to(share / settings.shake_frequency)
+        X_expected = X_WG @ inverse(seen_from_the_hand(settings, share)) @ inverse(X_WG) @ X_WO
         np.testing.assert_allclose(world.X_WB(body)[:3, :3], X_expected[:3, :3], atol=3e-3)
         np.testing.assert_allclose(world.X_WB(body)[:3, 3], X_expected[:3, 3], atol=1e-3)
+
+
+def test_an_untouched_body_of_parallel_worlds_stays_where_it_is(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their kernels have formulas of their own. The strokes are quick, so that steps are few."""
+    module = pytest.importorskip("burg_drake.simulation.batch.parallel_worlds")
+    settings = ShakeSettings(
+        shake_acceleration=200.0, turn_acceleration=1000.0, shake_frequency=10.0, shake_periods=1
+    )
+    quarter, found = 0.25 / settings.shake_frequency, []
+
+    class ShakenAtOnce(module._Batch):
+        def run(self, progress: object) -> None:
+            self._begin_trials()
+            module.mujoco_warp.kinematics(self._model, self._data)
+            with module.fixed_order(self._data):
+                for _ in range(8):
+                    self._state.phase.fill_(module.trial_kernels.LIFT)
+                    self._advance()
+                    begin = self._constants.target_qpos
+                    found.append(self._data.qpos.numpy()[0, begin : begin + 7].copy())
+
+    monkeypatch.setattr(module, "_Batch", ShakenAtOnce)
+    batch = BatchTrial(
+        scene,
+        make_station(),
+        engine=replace(ENGINES["mujoco-gpu"], time_step=quarter / 100),
+        settings=TrialSettings(shake=settings, poll=quarter, **NO_GRIP_LIMITS),
+        device="cpu",
+    )
+    batch.run("box", UNTOUCHED[None])
+    X_WO = batch.single.X_WO("box")
+    X_WG = X_WO @ UNTOUCHED
+    for k, (x, y, z, *wxyz) in enumerate(found, start=1):
+        X_GG = seen_from_the_hand(settings, 0.25 * k)
+        X_expected = X_WG @ inverse(X_GG) @ inverse(X_WG) @ X_WO
+        R_WO = Rotation.from_quat(np.roll(wxyz, -1)).as_matrix()
+        np.testing.assert_allclose(R_WO, X_expected[:3, :3], atol=3e-3)
+        np.testing.assert_allclose((x, y, z), X_expected[:3, 3], atol=2e-3)
 
 
 def begin(trial: HandTrial | MujocoTrial, X_OG: Array):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import platform
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -13,7 +14,14 @@ from typing import Any, Protocol
 
 from distributed import WorkerPlugin, get_worker
 
-from burg_drake.core import BurgError, SimulationError, Verdict, WorkerPool, one_line
+from burg_drake.core import (
+    BurgError,
+    DeviceError,
+    SimulationError,
+    Verdict,
+    WorkerPool,
+    one_line,
+)
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.unpacked_bundle import JudgeRecipe, bundle_folder, unpack
 from burg_drake.evaluation.executor import Job, JobFailed, JudgePool, WorkerLimits
@@ -182,11 +190,12 @@ class Supervisor(WorkerPlugin):
             if pool is None:
                 return ChunkAnswers(ended=True)
             pool.crashing.clear()
+            found: list[tuple[int, Verdict]] = []
             try:
-                found = [
-                    (places[id(grasp)], verdict)
-                    for _, grasp, verdict in pool.run([job], failed.append)
-                ]
+                for _, grasp, verdict in pool.run([job], failed.append):
+                    found.append((places[id(grasp)], verdict))
+            except DeviceError as error:
+                failed.append(JobFailed(job, DeviceError(f"{error}, on {platform.node()}")))
             except SimulationError:
                 if not pool.stopped:
                     raise

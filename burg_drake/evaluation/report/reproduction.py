@@ -13,11 +13,11 @@ from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.report.page_elements import ReportSection
 from burg_drake.evaluation.run_document import (
-    DEVICE_ENTRY,
     HASH_DIGITS,
     CampaignDocument,
     Input,
     RunDocument,
+    devices_of,
 )
 from burg_drake.evaluation.run_folder import GRASPS_FILE, RUN_FILE, STATION_FILE, Run
 from burg_drake.evaluation.settings import EvaluationSettings
@@ -196,7 +196,7 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
     packages = ("burg_drake", "drake", "python")
     approach = "; its approach is simulated" if document.trial.get("approach") else ""
     names = (*packages, *document.engine.packages)
-    device = document.versions.get(DEVICE_ENTRY)
+    devices = devices_of(document)
     return [
         ("station", _content_text(document.station)),
         ("mode", f"{document.mode}: {MODE_MEANINGS[document.mode]}{approach}"),
@@ -204,7 +204,7 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
         ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
-        *([("device", device)] if device else []),
+        *([("device", "; ".join(devices))] if devices else []),
     ]
 
 
@@ -277,5 +277,6 @@ def _session_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, 
         judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
         took = "" if session.seconds is None else f" in {format_duration(session.seconds)}"
         text = f"{session.started}: {judged}{took}, {count_with_noun(session.workers, 'worker')}"
+        text += f", on {session.device}" if session.device else ""
         lines.append(("judged", text))
     return [*lines, ("command", document.command)]

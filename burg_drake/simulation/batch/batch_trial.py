@@ -100,7 +100,7 @@ class BatchTrial:
 
     Attributes:
         single: the trial that executes grasps one by one on the CPU.
-        device: name of the device, with the versions of driver and CUDA.
+        device: name of the device, with the versions of CUDA, see `describe_devices`.
         worlds: largest number of worlds.
         batch_size: number of grasps beyond which a trial gets hardly cheaper.
         on_cpu: number of grasps that were executed on the CPU so far.

@@ -7,10 +7,11 @@ arrive. Sums of floats depend on that order: two trials of the same grasp differ
 
 `fixed_order` replaces three kernels while a step is recorded. Rows of contacts are numbered by
 their geoms and by the contact's number in this pair, and sums are taken in that order. The kernels
-are private to MuJoCo Warp and have the arguments of version 4.0.0, which is why `load_warp` accepts
-no other. They are for the solver of trials: Newton, elliptic cones of dimension 3, dense.
+are private to MuJoCo Warp and have the arguments of version 4.0.0, which is why `require_warp`
+accepts no other. They are for the solver of trials: Newton, elliptic cones of dimension 3, dense.
 """
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -28,27 +29,31 @@ SLIDING_STATE = int(ConstraintState.CONE)
 """State of a contact that slides."""
 MIN_DIVISOR = 1e-15
 """Smallest divisor, as in MuJoCo."""
+PATCH_LOCK = threading.Lock()
+"""Held while MuJoCo Warp's modules have other kernels, which all threads of the process share."""
 
 
 @contextmanager
 def fixed_order(data: Data) -> Iterator[None]:
     """Has the steps of this data that are recorded meanwhile take sums in a fixed order.
 
-    The data has to have been made with as many contacts for each world as rows / 3 or more.
+    Waits until no other thread of the process does the same. The data has to have been made with
+    as many contacts for each world as rows / 3 or more.
     """
     replaced = {
         (constraint, "_efc_contact_init"): _ContactRows(data),
         (solver, "_update_gradient_JTCJ_dense"): _always(_add_cones),
         (solver, "_update_gradient_grad"): _always(_set_gradient),
     }
-    before = {(module, name): getattr(module, name) for module, name in replaced}
-    for (module, name), new in replaced.items():
-        setattr(module, name, new)
-    try:
-        yield
-    finally:
-        for (module, name), old in before.items():
-            setattr(module, name, old)
+    with PATCH_LOCK:
+        before = {(module, name): getattr(module, name) for module, name in replaced}
+        for (module, name), new in replaced.items():
+            setattr(module, name, new)
+        try:
+            yield
+        finally:
+            for (module, name), old in before.items():
+                setattr(module, name, old)
 
 
 def _always(kernel: Any) -> Callable[..., Any]:

@@ -29,6 +29,7 @@ from burg_drake.simulation.batch.device_arrays import (
 )
 from burg_drake.simulation.batch.fixed_order import ROWS_PER_CONTACT, fixed_order
 from burg_drake.simulation.batch.trial_starts import End, TrialEnds, TrialStarts
+from burg_drake.simulation.batch.warp_device import record_compilation
 from burg_drake.simulation.mujoco_world import MujocoWorld
 
 CHECKS_PER_LOOK = 10
@@ -106,6 +107,7 @@ class ParallelWorlds:
         self._fingers_mobility = np.array(model.body_invweight0[world.index.fingers, 0])
         self.others = [body for name, body in world.free.items() if name != instance]
         self._rows, self._contacts = 0, 0.0  # Largest numbers so far, see `Room`.
+        self._limits: dict[Room, int] = {}  # Worlds that fit, where fewer did than asked for.
         with wp.ScopedDevice(device):
             self._constants = _constants(world, instance, X_WO, approaches=approaches)
             self._bodies = self._read_bodies()
@@ -156,9 +158,9 @@ class ParallelWorlds:
         progress: Callable[[], None] | None,
     ) -> None:
         """Executes some of the trials and writes how they end; in fewer worlds where there is no
-        memory for so many."""
+        memory for so many, and so from then on."""
         few = 16
-        worlds = min(worlds, len(rows))
+        worlds = min(worlds, len(rows), self._limit(room, worlds))
         while True:
             batch = None  # so that its memory is free
             try:
@@ -172,10 +174,20 @@ class ParallelWorlds:
                 if not has_no_memory or worlds <= few:
                     raise DeviceError(f"device {self._device} failed: {one_line(error)}") from error
                 worlds //= 2
+                self._limits[room] = worlds
         self._rows = max(self._rows, int(batch.counts.rows.numpy()[0]))
         contacts = float(batch.counts.contacts.numpy()[0]) / worlds
         self._contacts = max(self._contacts, contacts)
         batch.write_ends(ends, rows)
+
+    def _limit(self, room: Room, worlds: int) -> int:
+        """Largest number of worlds that have fit into the memory with this room or less."""
+        less = [
+            limit
+            for other, limit in self._limits.items()
+            if other.rows <= room.rows and other.contacts <= room.contacts
+        ]
+        return min(less, default=worlds)
 
     def pads(self, mass: Array) -> Array:
         """Contact of the pads (N, 2, 3) with targets of masses (N,), see
@@ -283,6 +295,7 @@ class _Batch:
         self._begin_trials()
         with fixed_order(self._data):  # It also keeps the arrays that the graph uses.
             self._advance()
+            record_compilation(wp.get_device())
             with wp.ScopedCapture() as capture:
                 self._advance()
             while int(self.counts.done.numpy()[0]) < self._size:

@@ -48,7 +48,7 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
 
     Raises:
         MissingDependencyError: see `require_warp`.
-        InvalidInputError: there is no such device, or no card.
+        InvalidInputError: there is no such device, no card, or its driver is too old.
     """
     require_warp()
     import warp as wp
@@ -64,29 +64,42 @@ def find_devices(name: str | None = None) -> list[wp.Device]:
             "engine mujoco-gpu needs an NVIDIA card, and there is none here; use engine mujoco, or"
             " give device cpu to try it without a card"
         ).about("device")
-    if cards and not wp.is_conditional_graph_supported():
-        raise InvalidInputError(
-            "engine mujoco-gpu needs a driver for CUDA 12.4 or later; update that of NVIDIA, or use"
-            " engine mujoco"
-        ).about("engine")
     if name is not None and name not in known:
         raise InvalidInputError(
             f"there is no device {name!r} here; there is {list_names(list(known))}"
         ).about("device")
-    return cards if name is None else [known[name]]
+    chosen = cards if name is None else [known[name]]
+    if chosen[0].is_cuda and not wp.is_conditional_graph_supported():
+        raise InvalidInputError(
+            "engine mujoco-gpu needs an NVIDIA driver that supports CUDA 12.4 or later; update the"
+            " driver, or use engine mujoco"
+        ).about("engine")
+    return chosen
 
 
 def kernels_are_compiled(device: wp.Device) -> bool:
-    """Whether the kernels of trials are in Warp's cache for a device of `find_devices`; others may
-    still have to be compiled, as some depend on the number of joints."""
+    """Whether a batch of trials has run on a device of `find_devices`, so that its kernels are in
+    Warp's cache; others may still have to be compiled, as some depend on the number of joints."""
+    return _compiled_file(device).exists()
+
+
+def record_compilation(device: wp.Device) -> None:
+    """Records in Warp's cache that all kernels of a batch are compiled for a device."""
+    file = _compiled_file(device)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.touch()
+
+
+def _compiled_file(device: wp.Device) -> Path:
+    """File that says so. It is in the folder of the kernels of trials, so that it goes with them if
+    the cache is cleared or they change."""
     import warp as wp
 
     from burg_drake.simulation.batch import trial_kernels
 
     module = wp.get_module(trial_kernels.__name__).get_module_identifier()
-    kinds = (".cubin", ".ptx") if device.is_cuda else (".o",)
-    files = Path(wp.config.kernel_cache_dir, module).glob("*")
-    return any(file.suffix in kinds for file in files)
+    target = f"sm{device.arch}" if device.is_cuda else "cpu"
+    return Path(wp.config.kernel_cache_dir, module, f"batch_compiled_{target}")
 
 
 @contextmanager
@@ -127,14 +140,15 @@ def _lock_file(card: wp.Device) -> Path:
 
 
 def describe_devices(devices: Sequence[wp.Device]) -> str:
-    """Names of devices, and for cards the versions of driver and CUDA."""
+    """Names of devices, and for cards the versions of CUDA: the newest one that their driver
+    supports, and the one that Warp is built with."""
     import warp as wp
 
     if not devices[0].is_cuda:
         return "cpu"
-    driver, toolkit = (
+    supported, built = (
         ".".join(map(str, version))
         for version in (wp.get_cuda_driver_version(), wp.get_cuda_toolkit_version())
     )
     names = list_names(sorted({device.name for device in devices}))
-    return f"{names} (driver for CUDA {driver}, CUDA {toolkit})"
+    return f"{names} (driver supports CUDA {supported}, Warp is built with CUDA {built})"
