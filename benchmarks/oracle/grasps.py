@@ -18,7 +18,7 @@ TILTED = np.deg2rad(20.0)
 WIDEST, NARROWEST = 0.074, 0.0015
 CLEAR = 1.5e-3
 """What is nearer to the open hand is not clear [m]."""
-TRIES = 3000
+TRIES = 20000
 ENDS = (np.argmin, np.argmax)
 BESIDE = 1e-3
 """A sample this near to a line is on it [m]."""

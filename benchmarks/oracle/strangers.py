@@ -155,10 +155,9 @@ def spoon(spacing: float, head: float, length: float) -> Solid:
     """A flat ellipsoid on a rod along z, both of one thickness [m]."""
     handle = 0.35 * head
     axes = (handle, head, 1.4 * head)
-    stem = cylinder(spacing, handle, length).turned(
-        UPRIGHT, (0.0, 0.0, axes[2] + length / 2 - 0.01)
-    )
-    low, high = axes[2] - 0.01, axes[2] + length - 0.01
+    low = axes[2] - 0.01  # The rod begins in the head.
+    high = low + length
+    stem = cylinder(spacing, handle, length).turned(UPRIGHT, (0.0, 0.0, (low + high) / 2))
 
     def in_head(points: Array) -> Array:
         inside: Array = ((points / np.array(axes)) ** 2).sum(axis=1) < 1.0
@@ -256,7 +255,8 @@ KINDS: dict[str, tuple[tuple[str, Make, tuple[Array, ...]], ...]] = {
     "vessel": (
         ("thin_bowl", partial(bowl, outer=0.06, wall=0.002), (UPRIGHT,)),
         ("thick_bowl", partial(bowl, outer=0.05, wall=0.008), (UPRIGHT,)),
-        ("cup", partial(cup, radii=(0.028, 0.036), wall=0.003, height=0.08), (UPRIGHT, UPSIDE_DOWN)),
+        ("cup", partial(cup, radii=(0.028, 0.036), wall=0.003, height=0.08),
+         (UPRIGHT, UPSIDE_DOWN)),
         ("beaker", partial(cup, radii=(0.034, 0.034), wall=0.0022, height=0.09), (UPRIGHT,)),
         ("flask", partial(turned, points=((0.0, 0.0), (0.034, 0.0), (0.034, 0.02), (0.012, 0.07),
                                           (0.012, 0.10), (0.0, 0.10))), (UPRIGHT,)),

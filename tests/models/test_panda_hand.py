@@ -187,7 +187,7 @@ def read_pad() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_strip_at_the_tip_of_a_pad_is_nearly_as_stiff_as_one_of_columns() -> None:
-    """Pressure in the tetrahedra, against the layer of 7.6 mm and 1e7 Pa that the pads stand for."""
+    """Pressure in the tetrahedra, against a layer of 7.6 mm and 1e7 Pa, as which the pads count."""
     points, cells = read_pad()
     depth, strip = 0.0004, 0.003
     x = np.linspace(-0.00875, 0.00875, 60)[1:-1]

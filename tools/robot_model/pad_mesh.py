@@ -3,14 +3,14 @@
 The tetrahedra that Drake makes of a box are too few for the torsional friction of a patch and too
 many for what they yield. A contact surface has one point of contact per polygon, so that friction
 about its normal lacks what lies within the polygons. Here tetrahedra join one inner point, where
-the pressure is highest, with the surface. Its front, which looks at the other finger, is divided into
-14 triangles that carry .965 of the torsional friction of a patch that covers it (2 x 2 squares
+the pressure is highest, with the surface. Its front, which looks at the other finger, is divided
+into 14 triangles that carry .965 of the torsional friction of a patch that covers it (2 x 2 squares
 .924, 3 x 3 .967), its other faces into as few as there can be.
 
-Pressure grows from 0 at all faces, so that at a depth d it lacks towards the sides of the pad. With
-the inner point in the middle that is a border of 1.1 d, half a millimetre of a patch at the tip:
-objects that are held there slip too early. With the point near the back the border is half as
-wide. The modulus grows with its depth, so that the front is as stiff.
+Pressure grows from 0 at all faces, so that it is too low near the sides of the pad: with the inner
+point in the middle, along a border of 1.1 times the depth. Objects that are held at the tip, half a
+millimetre deep, would slip too early. With the point near the back, the border is half as wide. The
+modulus grows with the depth of the point, so that the front stays as stiff.
 """
 
 from __future__ import annotations

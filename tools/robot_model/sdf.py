@@ -12,7 +12,7 @@ from tools.robot_model.pad_mesh import INNER_DEPTH, PAD_FILE
 from tools.robot_model.shapes import PAD, Box, Shape, axis_pose
 
 HYDROELASTIC_MODULUS = 1.0e7
-"""[Pa] Of all that the robot touches things with: of the pads as a layer of half their thickness."""
+"""[Pa] Of all that touches things: of the pads, as a layer of half their thickness."""
 PAD_MODULUS = HYDROELASTIC_MODULUS * 2 * INNER_DEPTH
 """[Pa] With which the fronts of the pads are as stiff, see `pad_mesh`."""
 DISSIPATION = 5.0
