@@ -217,12 +217,12 @@ def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:
     if settings.protocol == "lift":
         return settings
     for name in ("approach_angle_deg", "tilt_limit_deg", "slip_limit_mm"):
-        if getattr(settings, name) != getattr(EvaluationSettings, name):
+        if getattr(settings, name) is not None:
             raise InvalidInputError(
                 f"{name} is {getattr(settings, name):g}, but with protocol shake grasps come from"
                 " all sides, and an object may move in the hand; leave it out"
             ).about(name)
-    return replace(settings, approach_angle_deg=180.0, tilt_limit_deg=180.0, slip_limit_mm=np.inf)
+    return settings
 
 
 def _grasps_of(grasps: GraspSet, name: str) -> GraspSet:

@@ -257,7 +257,7 @@ class RunRequest:
         found = Grasps(
             origin="sampled",
             per_object=settings.grasps_per_object,
-            approach_angle_deg=float(settings.approach_angle_deg),
+            approach_angle_deg=float(settings.limits.approach_angle_deg),
             blind=settings.blind,
             only=self.only,
             count=0,
@@ -322,10 +322,11 @@ class RunRequest:
         """Settings of the trials."""
         from burg_drake.simulation import ShakeSettings, TrialSettings
 
+        limits = self.settings.limits
         return TrialSettings(
             motion=self.motion,
-            tilt_limit=math.radians(self.settings.tilt_limit_deg),
-            slip_limit=self.settings.slip_limit_mm / 1000.0,
+            tilt_limit=math.radians(limits.tilt_limit_deg),
+            slip_limit=limits.slip_limit_mm / 1000.0,
             approach=self.settings.approach,
             shake=ShakeSettings() if self.settings.protocol == "shake" else None,
         )

@@ -48,7 +48,16 @@ def test_shaken_grasps_are_replayed_and_can_be_made_again(shaken: Path, capsys: 
     assert "shaken 2 times along the approach" in out
     words = re.sub(r"<[^>]+>", " ", (run.path / "report.html").read_text()).split()
     assert words[words.index("--protocol") + 1] == "shake"
+    assert "--tilt-limit" not in words
     assert "mode hand, protocol shake, engine screening" in " ".join(words)
+
+
+def test_evaluate_shakes_in_the_same_way(shaken: Path) -> None:
+    """It goes on with the run of the labels, so that it has the same settings."""
+    run, scene = shaken / "runs" / "box", shaken / "scenes" / "box.yaml"
+    options = ["--mode", "hand", "--protocol", "shake", "--engine", "screening", "-n", "2"]
+    assert main(["evaluate", str(scene), *options, "-o", str(run), *QUICK]) == 0
+    assert load_run(run).document.trial["tilt_limit"] >= np.pi
 
 
 def test_labels_of_others_are_compared(shaken: Path, tmp_path: Path, capsys: Capture) -> None:

@@ -246,10 +246,9 @@ def add_evaluate_options(parser: options.Parser) -> None:
     options.add_cluster(workers_group)
     options.add_settings_options(parser, evaluation.EvaluationSettings, "table", "mode", "shard")
     options.add_settings_options(
-        parser,
-        evaluation.EvaluationSettings,
-        *("tilt_limit_deg", "slip_limit_mm", "approach", "protocol"),
+        parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", unset=True
     )
+    options.add_settings_options(parser, evaluation.EvaluationSettings, "approach", "protocol")
     options.add_motion_options(parser)
     options.add_retry_failed(parser, "grasps")
     parser.add_argument(
