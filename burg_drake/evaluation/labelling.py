@@ -18,10 +18,12 @@ from burg_drake.core import (
     UnknownNameError,
     ensure_writable_folder,
     inverse,
+    list_names,
     make_pose,
     portable_reference,
     suggest_names,
 )
+from burg_drake.evaluation.campaign_folder import is_campaign
 from burg_drake.evaluation.candidates import without_instance
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.executor import Executor
@@ -31,7 +33,7 @@ from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.run_preparation import RunRequest
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.formats import format_named, success_labels
-from burg_drake.objects import ObjectLibrary
+from burg_drake.objects import LibraryLike, ObjectLibrary, as_library
 from burg_drake.scene import Board, Instance, Scene, SceneDocument, place_objects, save_scene
 from burg_drake.simulation import TrialProtocol, height_to_shake
 from burg_drake.station import Station, StationLike, as_engine, as_station, station_gripper
@@ -64,7 +66,7 @@ class ObjectLabels:
 
 
 def label_library(
-    library: ObjectLibrary,
+    library: LibraryLike,
     station: StationLike,
     out: str | Path,
     *,
@@ -85,14 +87,14 @@ def label_library(
 
     Example::
 
-        library = burg.load_library("household")
-        for labels in burg.grasps.label_library(library, "panda_tabletop", "labels"):
+        for labels in burg.grasps.label_library("household", "panda_tabletop", "labels"):
             print(labels.object, labels.success.mean(), labels.path)
 
     Args:
-        library: the objects.
-        station: table and hand.
-        out: folder for the files of grasps, and for scenes and runs.
+        library: the objects; as loaded, or a reference for `load_library`.
+        station: table and hand; likewise, for `load_station`.
+        out: folder for the files of grasps, and for scenes and runs. Only files of earlier calls
+            are replaced.
         format: format of the files, see `formats.GRASP_FORMATS`; each holds one object.
         grasps: grasps in object frames, to be labelled in place of sampled ones.
         settings: settings of the runs, in mode `hand`; `only` has names of objects.
@@ -103,17 +105,19 @@ def label_library(
 
     Raises:
         InvalidInputError: a bad argument, a setting that has no effect, no object to label, or a
-            folder with labels by other settings.
+            folder that is a run, or has labels by other settings or other files of these names.
         UnknownNameError: there is no such object or format.
         MissingDependencyError: the engine is not installed.
     """
     settings, station, folder = settings or EvaluationSettings(), as_station(station), Path(out)
+    library = as_library(library)
     names, target = _chosen_objects(library, settings.only, grasps), format_named(format)
     if target.frame != "object":
         raise InvalidInputError(
             f"{target.title} has grasps in the {target.frame} frame, but those of objects are"
             " labelled; give a format with the frame of objects"
         )
+    _require_label_folder(folder, names, target.suffixes[0])
     settings = _labelling_settings(settings)
     RunRequest.of(station, settings)
     if executor is None:
@@ -202,6 +206,30 @@ def single_object_scene(
     return place_objects(document, library, path)
 
 
+def _require_label_folder(folder: Path, names: Iterable[str], suffix: str) -> None:
+    """Refuses a folder in which labels would replace anything but labels of an earlier call.
+
+    Args:
+        folder: folder of the labels; it need not exist.
+        names: names of the objects.
+        suffix: suffix of the files of grasps.
+
+    Raises:
+        InvalidInputError: the folder is a run, or has a file of an object without a run.
+    """
+    if (folder / RUN_FILE).exists() or is_campaign(folder):
+        raise InvalidInputError(
+            f"{folder} is the folder of a run; choose another folder for the labels"
+        ).about("out")
+    runs = folder / LABELLING_RUNS_FOLDER
+    files = [f"{name}{suffix}" for name in names if not (runs / name / RUN_FILE).exists()]
+    if foreign := [file for file in files if (folder / file).exists()]:
+        raise InvalidInputError(
+            f"{folder} has {list_names(foreign)}, which no run in {runs} has labelled, and which"
+            " labels would replace; choose another folder"
+        ).about("out")
+
+
 def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:
     """The settings of runs that label grasps.
 
@@ -249,6 +277,11 @@ def _chosen_objects(
     chosen = set(library.objects if only is None else only)
     chosen = chosen if given is None else chosen & given
     found = [n for n, e in library.objects.items() if n in chosen and (only or not e.is_fixed)]
+    if not found and only and given is not None:
+        raise InvalidInputError(
+            f"the given grasps are of {list_names(sorted(given))}, but those of"
+            f" {list_names(list(only))} are to be labelled; give grasps of these objects"
+        ).about("only", "grasps")
     if not found:
         raise InvalidInputError(f"library {library.name!r} has no objects to label grasps of")
     files: dict[str, str] = {}

@@ -69,6 +69,16 @@ def test_labels_of_others_are_compared(shaken: Path, tmp_path: Path, capsys: Cap
     assert "1 of 2" in capsys.readouterr().out
 
 
+def test_grasps_are_not_replaced_by_their_labels(
+    shaken: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    """Also not if they are labels of an earlier call."""
+    before = (shaken / "box.h5").read_bytes()
+    assert label("--grasps", str(shaken / "box.h5"), "-o", str(shaken)) == 2
+    assert "labels would replace" in capsys.readouterr().err
+    assert (shaken / "box.h5").read_bytes() == before
+
+
 def test_what_has_no_effect_is_refused(tmp_path: Path, capsys: Capture) -> None:
     for more in (["--tilt-limit", "10"], ["--approach-angle", "30"]):
         assert label("--protocol", "shake", *more, "-o", str(tmp_path / "out")) == 2

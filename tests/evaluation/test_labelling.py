@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core import InvalidInputError, Outcome, Pose, UnknownNameError
+from burg_drake.core import GraspSet, InvalidInputError, Outcome, Pose, UnknownNameError
 from burg_drake.evaluation import (
     EvaluationSettings,
     ObjectLabels,
@@ -185,6 +185,9 @@ def test_what_cannot_be_labelled_is_refused(
     def label(**more) -> ObjectLabels:
         return next(label_library(library, station, tmp_path / "out", progress=False, **more))
 
+    grasps = GraspSet.create(np.eye(4)[None], object="cube")
+    with pytest.raises(InvalidInputError, match="grasps are of cube, but those of heavy are to"):
+        label(settings=EvaluationSettings(only="heavy"), grasps=grasps)
     with pytest.raises(UnknownNameError, match=r"no object 'cub'.*cube"):
         label(settings=EvaluationSettings(only="cub"))
     with pytest.raises(InvalidInputError, match="in the camera frame"):
@@ -194,6 +197,28 @@ def test_what_cannot_be_labelled_is_refused(
             label(settings=EvaluationSettings(**more))
     assert not (tmp_path / "out").exists()
     assert "has no mass" in label(settings=EvaluationSettings(only="wall")).error
+
+
+def test_files_of_others_are_not_replaced(
+    labelled: list[ObjectLabels], library: ObjectLibrary, station: Station, tmp_path: Path
+) -> None:
+    """Neither those of the user nor those of a run."""
+    (tmp_path / "heavy.h5").write_text("mine")
+    for folder, why in (
+        (tmp_path, r"has heavy\.h5, which no run in .*runs has labelled"),
+        (labelled[0].run.path, "is the folder of a run; choose another folder"),
+    ):
+        with pytest.raises(InvalidInputError, match=why):
+            next(label_library(library, station, folder, settings=SETTINGS, progress=False))
+    assert [path.name for path in tmp_path.iterdir()] == ["heavy.h5"]
+
+
+def test_a_library_is_given_by_its_folder(
+    library: ObjectLibrary, station: Station, tmp_path: Path
+) -> None:
+    settings = EvaluationSettings(only="wall")
+    (found,) = label_library(library.root, station, tmp_path, settings=settings, progress=False)
+    assert "has no mass" in found.error
 
 
 def test_only_one_object_is_shaken_and_only_by_the_hand(station: Station, tmp_path: Path) -> None:

@@ -72,6 +72,8 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     target = arguments.target or formats.BURG_DRAKE_FORMAT.name
     output = options.grasp_output(f"{arguments.output}/", target, frame="object")
     grasps = _given_grasps(arguments)
+    if grasps is not None:
+        _refuse_replaced_input(arguments.grasps, grasps, output)
     labelled = []
     with options.cluster_from_options(arguments) as executor:
         for found in evaluation.label_library(
@@ -143,6 +145,17 @@ def _given_grasps(arguments: argparse.Namespace) -> core.GraspSet | None:
         )
     print_note_lines(imported.notes)
     return with_objects_renamed(imported.grasps, dict(arguments.rename))
+
+
+def _refuse_replaced_input(source: str, grasps: core.GraspSet, output: options.GraspOutput) -> None:
+    """Refuses to write labels over the file that the grasps come from."""
+    suffix = output.format.suffixes[0]
+    files = {(output.path / f"{name}{suffix}").resolve() for name in set(grasps.object.tolist())}
+    if Path(source).resolve() in files:
+        raise core.InvalidInputError(
+            f"the labels would replace {source}, from which the grasps come (--grasps); choose"
+            " another folder (-o)"
+        )
 
 
 def labels_table(labelled: Sequence[evaluation.ObjectLabels]) -> core.TextTable:
