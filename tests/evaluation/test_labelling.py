@@ -15,6 +15,7 @@ from burg_drake.evaluation import (
     ObjectLabels,
     assess_robustness,
     evaluate,
+    judge_again,
     label_library,
     load_run,
 )
@@ -177,6 +178,11 @@ def test_shaken_objects_are_not_those_of_a_robot(
         assess_robustness(found.run, progress=False)
     with pytest.raises(InvalidInputError, match="its objects were shaken"):
         plan_trials(found.run)
+    with pytest.raises(InvalidInputError, match="no confidence, so that none is contested"):
+        judge_again(found.run)
+    again = label_library(library, station, tmp_path, settings=settings, second_engine="reference")
+    with pytest.raises(InvalidInputError, match="no confidence, so that none is contested"):
+        next(again)
 
 
 def test_what_cannot_be_labelled_is_refused(

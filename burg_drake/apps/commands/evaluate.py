@@ -45,6 +45,7 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) ->
     chosen: str = arguments.engine
     if arguments.rejudge is None:
         return chosen
+    refuse_rejudging_shaken(arguments)
     exists = evaluation.is_campaign(folder) or (Path(folder) / evaluation.RUN_FILE).exists()
     engine = evaluation.open_results(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
     if arguments.shard is not None:
@@ -54,6 +55,25 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) ->
         )
     evaluation.require_second_engine(chosen, engine, mode)
     return engine
+
+
+def refuse_rejudging_shaken(arguments: argparse.Namespace) -> None:
+    """Refuses --rejudge for objects that are shaken.
+
+    Raises:
+        InvalidInputError: it is given with --protocol shake.
+    """
+    if arguments.rejudge is not None and arguments.protocol == "shake":
+        raise core.InvalidInputError(
+            "--rejudge contested has no effect with --protocol shake: the verdicts of shaken"
+            " objects have no confidence, so that none is contested; leave it out"
+        )
+
+
+def settling_options(run: evaluation.Run) -> str:
+    """The options with which the command of a run settles its contested verdicts."""
+    finer = "mujoco" if run.document.engine.name == "reference" else "reference"
+    return f"--rejudge contested --engine {finer}"
 
 
 def second_opinion_line(columns: evaluation.Columns) -> str:
@@ -318,6 +338,8 @@ def _grasps_of_scene(
     warnings = require_valid_scene(scene, station)
     if mode != "hand":
         warnings += require_usable_arm(scene, station)
+    if arguments.protocol == "shake":
+        warnings = ()  # they are about objects that do not stand, but nothing falls
     for warning in warnings:
         print_warning(warning)
     return given.by_instance if given else None
@@ -364,10 +386,9 @@ def _print_run(run: evaluation.Run, motion: GraspMotion, *, rejudged: bool) -> N
     if rejudged or run.index.judged_again.any():
         print(second_opinion_line(run.columns(SECOND_OPINION_COLUMNS)))
     if contested := run.contested:
-        finer = "mujoco" if run.document.engine.name == "reference" else "reference"
         print(
             f"contested: {core.list_names(contested)}; judge them again by the same command with"
-            f" --rejudge contested --engine {finer}"
+            f" {settling_options(run)}"
         )
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")

@@ -5,12 +5,23 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from burg_drake import core, evaluation, formats
 from burg_drake.apps import options
+from burg_drake.apps.commands.evaluate import (
+    SECOND_OPINION_COLUMNS,
+    add_rejudge_contested,
+    refuse_rejudging_shaken,
+    second_opinion_line,
+    settling_options,
+)
 from burg_drake.apps.terminal import print_note_lines, print_remark
+
+if TYPE_CHECKING:
+    from burg_drake.station import Engine
 
 
 def add_grasps_label_options(parser: options.Parser) -> None:
@@ -19,6 +30,7 @@ def add_grasps_label_options(parser: options.Parser) -> None:
         "burg-drake grasps label household -n 2000 --to acronym -o labels/",
         "burg-drake grasps label my_library/ --protocol shake --engine mujoco -o shaken/",
         "burg-drake grasps label household -n 2000 --engine mujoco-gpu --to acronym -o labels/",
+        "burg-drake grasps label household -o labels/ --rejudge contested --engine reference",
         "burg-drake grasps label my_library/ --grasps Mug_3f2a_0.01.h5 --rename mug -o again/",
         "",
         "The same command continues where an interrupted one stopped.",
@@ -48,6 +60,7 @@ def add_grasps_label_options(parser: options.Parser) -> None:
     options.add_settings_options(
         parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", unset=True
     )
+    add_rejudge_contested(parser)
     workers_group = parser.add_mutually_exclusive_group()
     options.add_workers(workers_group)
     options.add_cluster(workers_group)
@@ -62,12 +75,14 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     options.require_grasp_file(arguments)
     options.refuse_sampling_options_with_file(arguments)
     _refuse_limits_of_shaking(arguments)
+    refuse_rejudging_shaken(arguments)
     library, station = load_library(arguments.library), load_station(arguments.station)
     settings = options.settings_from(
         arguments,
         evaluation.EvaluationSettings,
         grasps_per_object=options.grasps_per_object(arguments),
         only=arguments.only,
+        engine=_first_engine(arguments),
     )
     target = arguments.target or formats.BURG_DRAKE_FORMAT.name
     output = options.grasp_output(f"{arguments.output}/", target, frame="object")
@@ -83,6 +98,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             format=output.format.name,
             grasps=grasps,
             settings=settings,
+            second_engine=None if arguments.rejudge is None else arguments.engine,
             executor=executor,
             workers=arguments.workers,
             progress=not arguments.quiet,
@@ -95,7 +111,42 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     labels_table(labelled).show()
     of_runs = (note for found in labelled if found.run for note in evaluation.run_notes(found.run))
     print_note_lines(dict.fromkeys((*of_runs, *(n for found in labelled for n in found.notes))))
+    runs = [found.run for found in labelled if found.run]
+    if arguments.rejudge is not None and runs:
+        print(second_opinion_line(_joined_columns(runs)))
+    _print_contested(runs)
     return _report_failures(labelled, arguments.output)
+
+
+def _first_engine(arguments: argparse.Namespace) -> Engine | str:
+    """The engine that labels all grasps; with --rejudge that of the runs in the folder, or the
+    standard one for a new folder."""
+    from burg_drake.station import DEFAULT_ENGINE
+
+    if arguments.rejudge is None:
+        return str(arguments.engine)
+    runs = Path(arguments.output) / evaluation.LABELLING_RUNS_FOLDER
+    begun = sorted(runs.glob(f"*/{evaluation.RUN_FILE}"))
+    return evaluation.load_run(begun[0].parent).document.engine if begun else DEFAULT_ENGINE
+
+
+def _joined_columns(runs: Sequence[evaluation.Run]) -> evaluation.Columns:
+    """The columns of all runs that `second_opinion_line` reads."""
+    columns = [run.columns(SECOND_OPINION_COLUMNS) for run in runs]
+    return {name: np.concatenate([c[name] for c in columns]) for name in SECOND_OPINION_COLUMNS}
+
+
+def _print_contested(runs: Sequence[evaluation.Run]) -> None:
+    """Prints how many labels are contested, by object, and how to settle them."""
+    contested = {run.document.scene.name: len(run.contested) for run in runs}
+    if not sum(contested.values()):
+        return
+    count = core.count_with_noun(sum(contested.values()), "label")
+    by_object = core.list_names([f"{name} {n}" for name, n in contested.items() if n])
+    print(
+        f"contested: {count} ({by_object}); settle them by the same command with"
+        f" {settling_options(runs[0])}"
+    )
 
 
 def _report_failures(labelled: Sequence[evaluation.ObjectLabels], folder: str) -> int:
