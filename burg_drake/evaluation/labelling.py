@@ -33,9 +33,18 @@ from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.run_preparation import RunRequest
 from burg_drake.evaluation.second_opinion import judge_again, require_second_engine
 from burg_drake.evaluation.settings import EvaluationSettings
+from burg_drake.evaluation.trial_origin import protocol_of
 from burg_drake.formats import format_named, success_labels
 from burg_drake.objects import LibraryLike, ObjectLibrary, as_library
-from burg_drake.scene import Board, Instance, Scene, SceneDocument, place_objects, save_scene
+from burg_drake.scene import (
+    Board,
+    Instance,
+    Scene,
+    SceneDocument,
+    load_scene,
+    place_objects,
+    save_scene,
+)
 from burg_drake.simulation import TrialProtocol, height_to_shake
 from burg_drake.station import Station, StationLike, as_engine, as_station, station_gripper
 
@@ -53,7 +62,8 @@ class ObjectLabels:
         success: (N,) 1 if a grasp holds, 0 if not, NaN if it could not be simulated.
         given: (N,) labels that the grasps came with; NaN where there are none.
         path: file of the grasps; None if there are none.
-        notes: what the file cannot carry, one sentence each.
+        notes: whether the grasps come from a scene with another pose of the object, and what the
+            file cannot carry, one sentence each.
         error: why the object cannot be evaluated; empty if it was.
     """
 
@@ -118,8 +128,8 @@ def label_library(
     names, target = _chosen_objects(library, settings.only, grasps), format_named(format)
     if target.frame != "object":
         raise InvalidInputError(
-            f"{target.title} has grasps in the {target.frame} frame, but those of objects are"
-            " labelled; give a format with the frame of objects"
+            f"files of {target.title} have grasps in the {target.frame} frame, but those of objects"
+            " are labelled; give a format with the frame of objects"
         )
     _require_label_folder(folder, names, target.suffixes[0])
     if second_engine is not None:
@@ -170,7 +180,7 @@ def label_library(
             success=success_labels(found),
             given=success_labels(run.candidates.grasps),
             path=file if len(found) else None,
-            notes=notes,
+            notes=(*([] if grasps is None else _pose_notes(grasps, run, name)), *notes),
         )
 
 
@@ -280,6 +290,27 @@ def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:
                 " all sides, and an object may move in the hand; leave it out"
             ).about(name)
     return settings
+
+
+def _pose_notes(grasps: GraspSet, run: Run, name: str) -> list[str]:
+    """A note if given grasps come from a scene in which their object stands in another pose."""
+    max_angle = 5.0  # Degrees between the directions that are up; a smaller one changes few labels.
+    reference = grasps.provenance.get("scene")
+    if protocol_of(run.document.trial) != "lift" or not isinstance(reference, str):
+        return []
+    try:
+        before = load_scene(reference)
+    except BurgError:  # it is gone, or has changed
+        return []
+    up_O = run.scene().X_SO(name)[2, :3]
+    upright = np.cos(np.radians(max_angle))
+    instances = [n for n, instance in before.instances.items() if instance.object == name]
+    if all(before.X_SO(n)[2, :3] @ up_O > upright for n in instances):
+        return []
+    return [
+        f"{name}: it stands in another pose than in {reference}, from which its grasps come, so"
+        " that labels may differ"
+    ]
 
 
 def _grasps_of(grasps: GraspSet, name: str) -> GraspSet:

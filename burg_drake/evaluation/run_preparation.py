@@ -279,6 +279,7 @@ class RunRequest:
             "command": current_command(),
             "station": input_of(self.station, "stations"),
             "engine": self.engine,
+            "protocol": self.settings.protocol,
             "trial": {**settings_numbers(self.trial_settings), **MEASURE_NUMBERS},
             "mode": self.mode,
             "arm": {} if self.mode == "hand" else settings_numbers(arm_settings(self.motion)),

@@ -11,7 +11,7 @@ import pytest
 from burg_drake.apps import main
 from burg_drake.core import GraspSet, verdict
 from burg_drake.evaluation import load_run, results_table
-from burg_drake.formats import read_grasp_file, success_labels
+from burg_drake.formats import LABELLED_BY, read_grasp_file, success_labels
 
 Capture = pytest.CaptureFixture[str]
 QUICK = ["--workers", "1", "--quiet"]
@@ -63,6 +63,10 @@ def test_shaken_grasps_are_replayed_and_can_be_made_again(shaken: Path, capsys: 
     run = load_run(shaken / "runs" / "box")
     assert main(["replay", str(run.path), "--grasp", run.candidates[0].id, "--no-wait"]) == 0
     out = capsys.readouterr().out
+    assert run.document.protocol == "shake"
+    by = read_grasp_file(shaken / "box.h5").grasps.provenance[LABELLED_BY]
+    assert by["trial"]["shake_periods"] == 2
+    assert not {"lift_height", "lift_time", "hold_time"} & set(by["trial"])
     assert "shaken 2 times along the approach" in out
     words = re.sub(r"<[^>]+>", " ", (run.path / "report.html").read_text()).split()
     assert words[words.index("--protocol") + 1] == "shake"
@@ -77,6 +81,8 @@ def test_evaluate_shakes_in_the_same_way(shaken: Path, capsys: Capture) -> None:
     command = ["evaluate", str(scene), *options, "-o", str(run), *QUICK]
     assert main(command) == 0
     assert "will fall" not in capsys.readouterr().err  # as there is no gravity
+    assert main(["evaluate", "tabletop_six", *command[2:-5], "-o", str(run / "six")]) == 2
+    assert "grasps label LIBRARY --protocol shake" in capsys.readouterr().err
     assert main([*command, "--rejudge", "contested"]) == 2
     assert "have no confidence, so that none is contested" in capsys.readouterr().err
     assert load_run(run).document.trial["tilt_limit"] >= np.pi

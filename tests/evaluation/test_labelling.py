@@ -28,6 +28,7 @@ from burg_drake.formats import (
 )
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import save_scene
 from burg_drake.station import Station, instance_pose, load_station
 
 SETTINGS = EvaluationSettings(
@@ -91,6 +92,7 @@ def test_each_object_that_can_be_held_gets_a_file_of_labels(labelled: list[Objec
 def test_a_file_says_who_labelled_it_and_how(labelled: list[ObjectLabels]) -> None:
     by = read_grasp_file(labelled[0].path, "acronym").grasps.provenance[LABELLED_BY]
     assert (by["engine"], by["protocol"], by["mode"]) == ("screening", "lift", "hand")
+    assert labelled[0].run.document.protocol == "lift"
     assert by["trial"] == labelled[0].run.document.trial
     assert by["versions"]["drake"]
 
@@ -141,6 +143,30 @@ def test_given_grasps_keep_their_labels_beside_the_new_ones(
         np.testing.assert_array_equal(found.success, [1.0, 1.0, 1.0])
         again = success_labels(read_grasp_file(found.path, "acronym").grasps)
         np.testing.assert_array_equal(again, found.success)
+
+
+def test_another_pose_of_the_object_is_told(
+    labelled: list[ObjectLabels],
+    library: ObjectLibrary,
+    station: Station,
+    judged_here: None,
+    tmp_path: Path,
+) -> None:
+    """The grasps come from a scene in which the cube lies on its side."""
+    document = labelled[0].run.scene().document
+    grasps = read_grasp_file(labelled[0].path, "acronym").grasps
+    for angle, notes in ((90.0, 1), (0.0, 0)):
+        (cube,) = document.instances
+        X_SO = Pose((0.2, 0.2, 0.1), rpy_deg=(angle, 0.0, 30.0))
+        scene = replace(document, library=str(library.root), instances=(replace(cube, X_SO=X_SO),))
+        save_scene(scene, tmp_path / f"{angle:g}.yaml")
+        given = replace(grasps, provenance={"scene": str(tmp_path / f"{angle:g}.yaml")})
+        out = tmp_path / f"labels_{angle:g}"
+        (found,) = label_library(
+            library, station, out, grasps=given, settings=SETTINGS, workers=1, progress=False
+        )
+        told = [note for note in found.notes if "stands in another pose than in" in note]
+        assert len(told) == notes
 
 
 def test_shaken_objects_are_alone_in_the_air(

@@ -293,6 +293,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             f"{len(references)} scenes are given; name a folder for the run with -o RUN"
         )
     scene = None if several else load_scene(references[0])
+    if scene is not None:
+        _require_one_to_shake(arguments, scene)
     station = load_station(arguments.station)
     mode = evaluation.mode_for(station, arguments.mode)
     options.refuse_standoff_without_arm(arguments, mode)
@@ -322,6 +324,21 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         print(second_opinion_line(found.columns(SECOND_OPINION_COLUMNS)))
     _print_motion(motion)
     return report_campaign_failures(found)
+
+
+def _require_one_to_shake(arguments: argparse.Namespace, scene: Scene) -> None:
+    """Refuses to shake several objects, and names the command for them.
+
+    Raises:
+        InvalidInputError: there are several, and --protocol is shake.
+    """
+    count = len(scene.instances) + len(scene.background)
+    if arguments.protocol == "shake" and count > 1:
+        raise core.InvalidInputError(
+            f"scene {scene.name!r} has {count} objects, but with --protocol shake the hand holds"
+            " one that is alone; `burg-drake grasps label LIBRARY --protocol shake` shakes the"
+            " objects of a library, each by itself"
+        )
 
 
 def _grasps_of_scene(
