@@ -31,7 +31,6 @@ from burg_drake.evaluation.grasp_sets.input import run_grasps
 from burg_drake.evaluation.judge import require_device
 from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.run_preparation import RunRequest
-from burg_drake.evaluation.second_opinion import judge_again, require_second_engine
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.evaluation.trial_origin import protocol_of
 from burg_drake.formats import format_named, success_labels
@@ -84,7 +83,6 @@ def label_library(
     format: str = "burg_drake",
     grasps: GraspSet | None = None,
     settings: EvaluationSettings | None = None,
-    second_engine: str | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: bool | Listener = True,
@@ -93,7 +91,8 @@ def label_library(
 
     Each object stands alone on the table, or with protocol `shake` is alone in the air. Each gets a
     run of its own, with all outcomes and margins, and a file of its grasps; a call on the same
-    folder goes on where an earlier one stopped. With protocol `shake` grasps come from all sides,
+    folder goes on where an earlier one stopped, and writes labels that `runs.judge_again` has
+    settled since. With protocol `shake` grasps come from all sides,
     and no limit on motion in the hand applies, as in ACRONYM. An object that cannot be evaluated
     does not stop the others.
 
@@ -110,8 +109,6 @@ def label_library(
         format: format of the files, see `formats.GRASP_FORMATS`; each holds one object.
         grasps: grasps in object frames, to be labelled in place of sampled ones.
         settings: settings of the runs, in mode `hand`; `only` has names of objects.
-        second_engine: name of a preset that settles contested labels, see `runs.judge_again`; None
-            to leave them contested.
         executor, workers, progress: see `evaluate`.
 
     Yields:
@@ -120,7 +117,7 @@ def label_library(
     Raises:
         InvalidInputError: a bad argument, a setting that has no effect, no object to label, or a
             folder that is a run, or has labels by other settings or other files of these names.
-        UnknownNameError: there is no such object, format or engine.
+        UnknownNameError: there is no such object or format.
         MissingDependencyError: the engine is not installed.
     """
     settings, station, folder = settings or EvaluationSettings(), as_station(station), Path(out)
@@ -132,8 +129,6 @@ def label_library(
             " are labelled; give a format with the frame of objects"
         )
     _require_label_folder(folder, names, target.suffixes[0])
-    if second_engine is not None:
-        _require_settling(settings, second_engine)
     settings = _labelling_settings(settings)
     RunRequest.of(station, settings)
     if executor is None:
@@ -158,14 +153,6 @@ def label_library(
                 workers=workers,
                 progress=progress,
             )
-            if second_engine is not None and run.contested:
-                run = judge_again(
-                    run,
-                    engine=second_engine,
-                    executor=executor,
-                    workers=workers,
-                    progress=progress,
-                )
             found, file = run_grasps(run), folder / f"{name}{target.suffixes[0]}"
             notes = target.write(found, file, station_gripper(station)) if len(found) else ()
         except BurgError as error:
@@ -252,21 +239,6 @@ def _require_label_folder(folder: Path, names: Iterable[str], suffix: str) -> No
             f"{folder} has {list_names(foreign)}, which no run in {runs} has labelled, and which"
             " labels would replace; choose another folder"
         ).about("out")
-
-
-def _require_settling(settings: EvaluationSettings, second_engine: str) -> None:
-    """Refuses a second engine that cannot settle contested labels.
-
-    Raises:
-        InvalidInputError: the objects are shaken, or see `require_second_engine`.
-        UnknownNameError, MissingDependencyError: see `require_second_engine`.
-    """
-    if settings.protocol == "shake":
-        raise InvalidInputError(
-            "labels of shaken objects have no confidence, so that none is contested; leave the"
-            " second engine out"
-        ).about("protocol")
-    require_second_engine(second_engine, as_engine(settings.engine), "hand")
 
 
 def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:

@@ -79,6 +79,7 @@ from burg_drake.evaluation.settings import (
     Shard,
     TableFormat,
     as_shard,
+    grasp_limits,
 )
 from burg_drake.evaluation.table_file import write_table
 from burg_drake.evaluation.trial_origin import MEASURE_NUMBERS
@@ -257,7 +258,7 @@ class RunRequest:
         found = Grasps(
             origin="sampled",
             per_object=settings.grasps_per_object,
-            approach_angle_deg=float(settings.limits.approach_angle_deg),
+            approach_angle_deg=float(grasp_limits(settings).approach_angle_deg),
             blind=settings.blind,
             only=self.only,
             count=0,
@@ -323,7 +324,7 @@ class RunRequest:
         """Settings of the trials."""
         from burg_drake.simulation import ShakeSettings, TrialSettings
 
-        limits = self.settings.limits
+        limits = grasp_limits(self.settings)
         return TrialSettings(
             motion=self.motion,
             tilt_limit=math.radians(limits.tilt_limit_deg),

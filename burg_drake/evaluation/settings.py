@@ -222,7 +222,7 @@ class EvaluationSettings:
         max_grasps_per_object: with `until_balanced`, largest number of grasps per free instance.
         approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
             above 0; 90 includes approaches from the side, 180 all directions. If None, 75 with
-            protocol `lift`, and 180 with `shake`; `limits` has the limits that apply.
+            protocol `lift`, and 180 with `shake`.
         blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
             see `SamplingSettings`.
         only: names of free instances, or of objects for all their instances, whose grasps are
@@ -367,13 +367,6 @@ class EvaluationSettings:
                 f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0 (inf: no limit)"
             )
 
-    @property
-    def limits(self) -> GraspLimits:
-        """The limits that apply: those given, else those of the protocol."""
-        names = GraspLimits.__dataclass_fields__
-        given = {n: value for n in names if (value := getattr(self, n)) is not None}
-        return replace(DEFAULT_LIMITS[self.protocol], **given)
-
     def _require_no_balance(self) -> None:
         """Refuses settings that have no effect without `until_balanced`."""
         for name in ("balanced_among", "max_grasps_per_object"):
@@ -403,6 +396,13 @@ class EvaluationSettings:
                 "until_balanced has to know all grasps, but a shard judges only some of"
                 " them; leave out one of the two"
             ).about("until_balanced", "shard")
+
+
+def grasp_limits(settings: EvaluationSettings) -> GraspLimits:
+    """The limits that apply: those that the settings give, else those of their protocol."""
+    names = GraspLimits.__dataclass_fields__
+    given = {name: value for name in names if (value := getattr(settings, name)) is not None}
+    return replace(DEFAULT_LIMITS[settings.protocol], **given)
 
 
 ROBUSTNESS_TESTS = ("tug", "shake", "friction", "noise")  # Names of the tests.

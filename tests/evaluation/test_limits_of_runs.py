@@ -17,6 +17,7 @@ from burg_drake.evaluation import (
     Run,
     differences,
     evaluate,
+    grasp_limits,
     limit_settings,
     limits_text,
     load_run,
@@ -152,12 +153,12 @@ def test_a_wrong_protocol_is_refused_with_the_right_one() -> None:
 
 
 def test_shaken_objects_have_no_limits_unless_some_are_given() -> None:
-    shaken = EvaluationSettings(protocol="shake").limits
+    shaken = grasp_limits(EvaluationSettings(protocol="shake"))
     assert (shaken.approach_angle_deg, shaken.tilt_limit_deg) == (180.0, 180.0)
     assert shaken.slip_limit_mm == math.inf
-    given = EvaluationSettings(protocol="shake", tilt_limit_deg=30.0).limits
+    given = grasp_limits(EvaluationSettings(protocol="shake", tilt_limit_deg=30.0))
     assert (given.tilt_limit_deg, given.slip_limit_mm) == (30.0, math.inf)
-    assert dataclasses.replace(EvaluationSettings(), protocol="shake").limits == shaken
+    assert grasp_limits(dataclasses.replace(EvaluationSettings(), protocol="shake")) == shaken
 
 
 def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
@@ -168,6 +169,6 @@ def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
 
 
 def test_the_usual_limits_are_those_of_trials() -> None:
-    asked = EvaluationSettings().limits
+    asked = grasp_limits(EvaluationSettings())
     assert math.radians(asked.tilt_limit_deg) == DEFAULT_TRIAL.tilt_limit
     assert asked.slip_limit_mm / 1000.0 == DEFAULT_TRIAL.slip_limit

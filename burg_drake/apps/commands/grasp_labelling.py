@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,14 +70,10 @@ def add_grasps_label_options(parser: options.Parser) -> None:
 
 def run_grasps_label(arguments: argparse.Namespace) -> int:
     """Labels grasps and writes a file for each object; returns 1 if some were not simulated."""
-    from burg_drake.objects import load_library
-    from burg_drake.station import load_station
-
     options.require_grasp_file(arguments)
     options.refuse_sampling_options_with_file(arguments)
     _refuse_limits_of_shaking(arguments)
     refuse_rejudging_shaken(arguments)
-    library, station = load_library(arguments.library), load_station(arguments.station)
     settings = options.settings_from(
         arguments,
         evaluation.EvaluationSettings,
@@ -86,48 +83,79 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
     )
     target = arguments.target or formats.BURG_DRAKE_FORMAT.name
     output = options.grasp_output(f"{arguments.output}/", target, frame="object")
-    grasps = _given_grasps(arguments)
-    if grasps is not None:
-        _refuse_replaced_input(arguments.grasps, grasps, output)
+    grasps = _given_grasps(arguments, output)
     labelled = []
     with options.cluster_from_options(arguments) as executor:
-        for found in evaluation.label_library(
-            library,
-            station,
+        label = partial(
+            evaluation.label_library,
+            arguments.library,
+            arguments.station,
             arguments.output,
             format=output.format.name,
             grasps=grasps,
             settings=settings,
-            second_engine=None if arguments.rejudge is None else arguments.engine,
             executor=executor,
             workers=arguments.workers,
             progress=not arguments.quiet,
-        ):
+        )
+        if arguments.rejudge is not None:
+            _settle_contested(label(), arguments, executor)
+        for found in label():
             if found.path is not None:
                 of_format = options.format_title(output.format)
                 count = core.count_with_noun(len(found.success), "labelled grasp")
                 print(f"wrote {count} to {found.path} as {of_format}")
             labelled.append(found)
+    _print_labels(labelled, rejudged=arguments.rejudge is not None)
+    return _report_failures(labelled, arguments.output)
+
+
+def _print_labels(labelled: Sequence[evaluation.ObjectLabels], *, rejudged: bool) -> None:
+    """Prints the table of labels, notes, and how many labels are settled or contested."""
     labels_table(labelled).show()
     of_runs = (note for found in labelled if found.run for note in evaluation.run_notes(found.run))
     print_note_lines(dict.fromkeys((*of_runs, *(n for found in labelled for n in found.notes))))
     runs = [found.run for found in labelled if found.run]
-    if arguments.rejudge is not None and runs:
+    if rejudged and runs:
         print(second_opinion_line(_joined_columns(runs)))
     _print_contested(runs)
-    return _report_failures(labelled, arguments.output)
+
+
+def _settle_contested(
+    labelled: Iterable[evaluation.ObjectLabels],
+    arguments: argparse.Namespace,
+    executor: evaluation.Executor | None,
+) -> None:
+    """Judges the contested grasps of all objects again with the preset of --engine."""
+    for found in labelled:
+        if found.run and found.run.contested:
+            evaluation.judge_again(
+                found.run,
+                engine=arguments.engine,
+                executor=executor,
+                workers=arguments.workers,
+                progress=not arguments.quiet,
+            )
 
 
 def _first_engine(arguments: argparse.Namespace) -> Engine | str:
     """The engine that labels all grasps; with --rejudge that of the runs in the folder, or the
-    standard one for a new folder."""
-    from burg_drake.station import DEFAULT_ENGINE
+    standard one for a new folder.
+
+    Raises:
+        InvalidInputError, UnknownNameError: see `require_second_engine`.
+    """
+    from burg_drake.station import DEFAULT_ENGINE, ENGINES
 
     if arguments.rejudge is None:
         return str(arguments.engine)
     runs = Path(arguments.output) / evaluation.LABELLING_RUNS_FOLDER
     begun = sorted(runs.glob(f"*/{evaluation.RUN_FILE}"))
-    return evaluation.load_run(begun[0].parent).document.engine if begun else DEFAULT_ENGINE
+    first = ENGINES[DEFAULT_ENGINE]
+    if begun:
+        first = evaluation.load_run(begun[0].parent).document.engine
+    evaluation.require_second_engine(arguments.engine, first, "hand")
+    return first
 
 
 def _joined_columns(runs: Sequence[evaluation.Run]) -> evaluation.Columns:
@@ -177,8 +205,10 @@ def _refuse_limits_of_shaking(arguments: argparse.Namespace) -> None:
             )
 
 
-def _given_grasps(arguments: argparse.Namespace) -> core.GraspSet | None:
-    """The grasps of --grasps with their objects renamed."""
+def _given_grasps(
+    arguments: argparse.Namespace, output: options.GraspOutput
+) -> core.GraspSet | None:
+    """The grasps of --grasps with their objects renamed; their labels do not replace them."""
     from burg_drake.formats import with_objects_renamed
 
     if arguments.grasps is None:
@@ -195,7 +225,9 @@ def _given_grasps(arguments: argparse.Namespace) -> core.GraspSet | None:
             " of the objects with `burg-drake grasps convert`"
         )
     print_note_lines(imported.notes)
-    return with_objects_renamed(imported.grasps, dict(arguments.rename))
+    grasps = with_objects_renamed(imported.grasps, dict(arguments.rename))
+    _refuse_replaced_input(arguments.grasps, grasps, output)
+    return grasps
 
 
 def _refuse_replaced_input(source: str, grasps: core.GraspSet, output: options.GraspOutput) -> None:
