@@ -236,8 +236,8 @@ def _require_label_folder(folder: Path, names: Iterable[str], suffix: str) -> No
     files = [f"{name}{suffix}" for name in names if not (runs / name / RUN_FILE).exists()]
     if foreign := [file for file in files if (folder / file).exists()]:
         raise InvalidInputError(
-            f"{folder} has {list_names(foreign)}, which no run in {runs} has labelled, and which"
-            " labels would replace; choose another folder"
+            f"labels would replace {list_names(foreign)} in {folder}, which no earlier call has"
+            " written; choose another folder"
         ).about("out")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core import GraspSet, InvalidInputError, Outcome, Pose, UnknownNameError
+from burg_drake.core import InvalidInputError, Outcome, Pose, UnknownNameError
 from burg_drake.evaluation import (
     EvaluationSettings,
     ObjectLabels,
@@ -209,12 +209,12 @@ def test_shaken_objects_are_not_those_of_a_robot(
 
 
 def test_what_cannot_be_labelled_is_refused(
-    library: ObjectLibrary, station: Station, tmp_path: Path
+    labelled: list[ObjectLabels], library: ObjectLibrary, station: Station, tmp_path: Path
 ) -> None:
     def label(**more) -> ObjectLabels:
         return next(label_library(library, station, tmp_path / "out", progress=False, **more))
 
-    grasps = GraspSet.create(np.eye(4)[None], object="cube")
+    grasps = labelled[0].run.candidates.grasps
     with pytest.raises(InvalidInputError, match="grasps are of cube, but those of heavy are to"):
         label(settings=EvaluationSettings(only="heavy"), grasps=grasps)
     with pytest.raises(UnknownNameError, match=r"no object 'cub'.*cube"):
@@ -234,7 +234,7 @@ def test_files_of_others_are_not_replaced(
     """Neither those of the user nor those of a run."""
     (tmp_path / "heavy.h5").write_text("mine")
     for folder, why in (
-        (tmp_path, r"has heavy\.h5, which no run in .*runs has labelled"),
+        (tmp_path, r"would replace heavy\.h5 in .*, which no earlier call"),
         (labelled[0].run.path, "is the folder of a run; choose another folder"),
     ):
         with pytest.raises(InvalidInputError, match=why):
