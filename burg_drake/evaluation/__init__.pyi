@@ -337,6 +337,7 @@ from .settings import (
     RobustnessSettings as RobustnessSettings,
     SamplingSettings as SamplingSettings,
     Shard as Shard,
+    grasp_limits as grasp_limits,
 )
 from .status import RunWatch as RunWatch, Status as Status, read_status as read_status
 from .summary_tables import SummaryView as SummaryView, summary_view as summary_view

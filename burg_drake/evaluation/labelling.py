@@ -21,10 +21,12 @@ from burg_drake.core import (
     UnknownNameError,
     ensure_writable_folder,
     inverse,
+    list_names,
     make_pose,
     portable_reference,
     suggest_names,
 )
+from burg_drake.evaluation.campaign_folder import is_campaign
 from burg_drake.evaluation.candidates import without_instance
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.executor import Executor
@@ -33,9 +35,18 @@ from burg_drake.evaluation.judge import require_device
 from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.run_preparation import RunRequest
 from burg_drake.evaluation.settings import EvaluationSettings
+from burg_drake.evaluation.trial_origin import protocol_of
 from burg_drake.formats import format_named, success_labels
-from burg_drake.objects import ObjectLibrary
-from burg_drake.scene import Board, Instance, Scene, SceneDocument, place_objects, save_scene
+from burg_drake.objects import LibraryLike, ObjectLibrary, as_library
+from burg_drake.scene import (
+    Board,
+    Instance,
+    Scene,
+    SceneDocument,
+    load_scene,
+    place_objects,
+    save_scene,
+)
 from burg_drake.simulation import TrialProtocol, height_to_shake
 from burg_drake.station import Station, StationLike, as_engine, as_station, station_gripper
 
@@ -53,7 +64,8 @@ class ObjectLabels:
         success: (N,) 1 if a grasp holds, 0 if not, NaN if it could not be simulated.
         given: (N,) labels that the grasps came with; NaN where there are none.
         path: file of the grasps; None if there are none.
-        notes: what the file cannot carry, one sentence each.
+        notes: whether the grasps come from a scene with another pose of the object, and what the
+            file cannot carry, one sentence each.
         error: why the object cannot be evaluated; empty if it was.
     """
 
@@ -67,7 +79,7 @@ class ObjectLabels:
 
 
 def label_library(
-    library: ObjectLibrary,
+    library: LibraryLike,
     station: StationLike,
     out: str | Path,
     *,
@@ -82,20 +94,21 @@ def label_library(
 
     Each object stands alone on the table, or with protocol `shake` is alone in the air. Each gets a
     run of its own, with all outcomes and margins, and a file of its grasps; a call on the same
-    folder goes on where an earlier one stopped. With protocol `shake` grasps come from all sides,
+    folder goes on where an earlier one stopped, and writes labels that `runs.judge_again` has
+    settled since. With protocol `shake` grasps come from all sides,
     and no limit on motion in the hand applies, as in ACRONYM. An object that cannot be evaluated
     does not stop the others.
 
     Example::
 
-        library = burg.load_library("household")
-        for labels in burg.grasps.label_library(library, "panda_tabletop", "labels"):
+        for labels in burg.grasps.label_library("household", "panda_tabletop", "labels"):
             print(labels.object, labels.success.mean(), labels.path)
 
     Args:
-        library: the objects.
-        station: table and hand.
-        out: folder for the files of grasps, and for scenes and runs.
+        library: the objects; as loaded, or a reference for `load_library`.
+        station: table and hand; likewise, for `load_station`.
+        out: folder for the files of grasps, and for scenes and runs. Only files of earlier calls
+            are replaced.
         format: format of the files, see `formats.GRASP_FORMATS`; each holds one object.
         grasps: grasps in object frames, to be labelled in place of sampled ones.
         settings: settings of the runs, in mode `hand`; `only` has names of objects.
@@ -106,19 +119,21 @@ def label_library(
 
     Raises:
         InvalidInputError: a bad argument, a setting that has no effect, no object to label, or a
-            folder with labels by other settings.
+            folder that is a run, or has labels by other settings or other files of these names.
         UnknownNameError: there is no such object or format.
         MissingDependencyError: the engine is not installed.
         DeviceError: the cards fail.
         ClusterError: the cluster is lost.
     """
     settings, station, folder = settings or EvaluationSettings(), as_station(station), Path(out)
+    library = as_library(library)
     names, target = _chosen_objects(library, settings.only, grasps), format_named(format)
     if target.frame != "object":
         raise InvalidInputError(
-            f"{target.title} has grasps in the {target.frame} frame, but those of objects are"
-            " labelled; give a format with the frame of objects"
+            f"files of {target.title} have grasps in the {target.frame} frame, but those of objects"
+            " are labelled; give a format with the frame of objects"
         )
+    _require_label_folder(folder, names, target.suffixes[0])
     settings = _labelling_settings(settings)
     RunRequest.of(station, settings)
     runs = {name: folder / LABELLING_RUNS_FOLDER / name for name in names}
@@ -157,7 +172,7 @@ def label_library(
             success=success_labels(found),
             given=success_labels(run.candidates.grasps),
             path=file if len(found) else None,
-            notes=notes,
+            notes=(*([] if grasps is None else _pose_notes(grasps, run, name)), *notes),
         )
 
 
@@ -215,6 +230,30 @@ def single_object_scene(
     return place_objects(document, library, path)
 
 
+def _require_label_folder(folder: Path, names: Iterable[str], suffix: str) -> None:
+    """Refuses a folder in which labels would replace anything but labels of an earlier call.
+
+    Args:
+        folder: folder of the labels; it need not exist.
+        names: names of the objects.
+        suffix: suffix of the files of grasps.
+
+    Raises:
+        InvalidInputError: the folder is a run, or has a file of an object without a run.
+    """
+    if (folder / RUN_FILE).exists() or is_campaign(folder):
+        raise InvalidInputError(
+            f"{folder} is the folder of a run; choose another folder for the labels"
+        ).about("out")
+    runs = folder / LABELLING_RUNS_FOLDER
+    files = [f"{name}{suffix}" for name in names if not (runs / name / RUN_FILE).exists()]
+    if foreign := [file for file in files if (folder / file).exists()]:
+        raise InvalidInputError(
+            f"labels would replace {list_names(foreign)} in {folder}, which no earlier call has"
+            " written; choose another folder"
+        ).about("out")
+
+
 def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:
     """The settings of runs that label grasps.
 
@@ -230,12 +269,33 @@ def _labelling_settings(settings: EvaluationSettings) -> EvaluationSettings:
     if settings.protocol == "lift":
         return settings
     for name in ("approach_angle_deg", "tilt_limit_deg", "slip_limit_mm"):
-        if getattr(settings, name) != getattr(EvaluationSettings, name):
+        if getattr(settings, name) is not None:
             raise InvalidInputError(
                 f"{name} is {getattr(settings, name):g}, but with protocol shake grasps come from"
                 " all sides, and an object may move in the hand; leave it out"
             ).about(name)
-    return replace(settings, approach_angle_deg=180.0, tilt_limit_deg=180.0, slip_limit_mm=np.inf)
+    return settings
+
+
+def _pose_notes(grasps: GraspSet, run: Run, name: str) -> list[str]:
+    """A note if given grasps come from a scene in which their object stands in another pose."""
+    max_angle = 5.0  # Degrees between the directions that are up; a smaller one changes few labels.
+    reference = grasps.provenance.get("scene")
+    if protocol_of(run.document.trial) != "lift" or not isinstance(reference, str):
+        return []
+    try:
+        before = load_scene(reference)
+    except BurgError:  # it is gone, or has changed
+        return []
+    up_O = run.scene().X_SO(name)[2, :3]
+    upright = np.cos(np.radians(max_angle))
+    instances = [n for n, instance in before.instances.items() if instance.object == name]
+    if all(before.X_SO(n)[2, :3] @ up_O > upright for n in instances):
+        return []
+    return [
+        f"{name}: it stands in another pose than in {reference}, from which its grasps come, so"
+        " that labels may differ"
+    ]
 
 
 def _grasps_of(grasps: GraspSet, name: str) -> GraspSet:
@@ -262,6 +322,11 @@ def _chosen_objects(
     chosen = set(library.objects if only is None else only)
     chosen = chosen if given is None else chosen & given
     found = [n for n, e in library.objects.items() if n in chosen and (only or not e.is_fixed)]
+    if not found and only and given is not None:
+        raise InvalidInputError(
+            f"the given grasps are of {list_names(sorted(given))}, but those of"
+            f" {list_names(list(only))} are to be labelled; give grasps of these objects"
+        ).about("only", "grasps")
     if not found:
         raise InvalidInputError(f"library {library.name!r} has no objects to label grasps of")
     files: dict[str, str] = {}

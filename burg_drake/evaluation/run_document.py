@@ -14,6 +14,7 @@ from burg_drake.core import Among, Mode, data_root, require_name
 from burg_drake.evaluation.settings import Shard, TableFormat, as_shard
 from burg_drake.evaluation.trial_origin import TrialOrigin
 from burg_drake.scene import Scene
+from burg_drake.simulation import TrialProtocol
 from burg_drake.station import Engine, Station
 
 HASH_DIGITS = 12
@@ -133,6 +134,7 @@ class RunDocument:
         library: the object library.
         grasps: the grasps.
         engine: physics engine and its settings.
+        protocol: `lift`: objects are lifted. `shake`: they are shaken, alone and without gravity.
         trial: settings of the trials, in SI units.
         mode: `hand`: the hand alone executes the grasps. `reach`: the same, of grasps that the arm
             can execute. `arm`: the whole arm executes them.
@@ -153,6 +155,7 @@ class RunDocument:
     library: Library
     grasps: Grasps
     engine: Engine
+    protocol: TrialProtocol | None = None
     trial: dict[str, float] = field(default_factory=dict)
     mode: Mode
     arm: dict[str, float] = field(default_factory=dict)
@@ -210,6 +213,7 @@ class CampaignDocument:
         station: the station.
         grasps: the grasps of each scene.
         engine: physics engine and its settings.
+        protocol: `lift`: objects are lifted. `shake`: they are shaken, alone and without gravity.
         trial: settings of the trials, in SI units.
         mode: `hand`: the hand alone executes the grasps. `reach`: the same, of grasps that the arm
             can execute. `arm`: the whole arm executes them.
@@ -231,6 +235,7 @@ class CampaignDocument:
     station: Input
     grasps: Grasps
     engine: Engine
+    protocol: TrialProtocol | None = None
     trial: dict[str, float] = field(default_factory=dict)
     mode: Mode
     arm: dict[str, float] = field(default_factory=dict)

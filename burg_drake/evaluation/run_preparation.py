@@ -79,6 +79,7 @@ from burg_drake.evaluation.settings import (
     Shard,
     TableFormat,
     as_shard,
+    grasp_limits,
 )
 from burg_drake.evaluation.table_file import write_table
 from burg_drake.evaluation.trial_origin import MEASURE_NUMBERS
@@ -257,7 +258,7 @@ class RunRequest:
         found = Grasps(
             origin="sampled",
             per_object=settings.grasps_per_object,
-            approach_angle_deg=float(settings.approach_angle_deg),
+            approach_angle_deg=float(grasp_limits(settings).approach_angle_deg),
             blind=settings.blind,
             only=self.only,
             count=0,
@@ -279,6 +280,7 @@ class RunRequest:
             "command": current_command(),
             "station": input_of(self.station, "stations"),
             "engine": self.engine,
+            "protocol": self.settings.protocol,
             "trial": {**settings_numbers(self.trial_settings), **MEASURE_NUMBERS},
             "mode": self.mode,
             "arm": {} if self.mode == "hand" else settings_numbers(arm_settings(self.motion)),
@@ -322,10 +324,11 @@ class RunRequest:
         """Settings of the trials."""
         from burg_drake.simulation import ShakeSettings, TrialSettings
 
+        limits = grasp_limits(self.settings)
         return TrialSettings(
             motion=self.motion,
-            tilt_limit=math.radians(self.settings.tilt_limit_deg),
-            slip_limit=self.settings.slip_limit_mm / 1000.0,
+            tilt_limit=math.radians(limits.tilt_limit_deg),
+            slip_limit=limits.slip_limit_mm / 1000.0,
             approach=self.settings.approach,
             shake=ShakeSettings() if self.settings.protocol == "shake" else None,
         )

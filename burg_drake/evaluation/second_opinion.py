@@ -54,6 +54,7 @@ from burg_drake.evaluation.run_folder import REPORT_FILE, Run, load_run, save_ru
 from burg_drake.evaluation.run_preparation import finish_run
 from burg_drake.evaluation.run_summary import summarize
 from burg_drake.evaluation.scene_tasks import is_finished
+from burg_drake.evaluation.trial_origin import protocol_of
 from burg_drake.station import ENGINES, Engine
 
 OneRun = TypeVar("OneRun", Run, Campaign)
@@ -112,15 +113,20 @@ def judge_again(
         The run with the new verdicts. Grasps that the engine cannot simulate keep their old one.
 
     Raises:
-        InvalidInputError: the run is not complete, the engine is the run's own or does not support
-            the arm or an object, documents have changed since the run, or another process is
-            writing the folder.
+        InvalidInputError: the run is not complete, its objects were shaken, the engine is the run's
+            own or does not support the arm or an object, documents have changed since the run, or
+            another process is writing the folder.
         UnknownNameError: there is no such engine.
         MissingDependencyError: the engine is not installed.
         SimulationError: the worker processes die.
     """
     found = run if isinstance(run, (Run, Campaign)) else open_results(run)
     require_second_engine(engine, found.document.engine, found.document.mode)
+    if protocol_of(found.document.trial) == "shake":
+        raise InvalidInputError(
+            f"{found.path}: its objects were shaken, and the verdicts of such trials have no"
+            " confidence, so that none is contested"
+        )
     if found.document.shard:
         raise InvalidInputError(
             f"{found.path} is shard {found.document.shard} of a run; merge the shards first"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
 from burg_drake.core import (
@@ -116,6 +116,29 @@ class SamplingSettings:
             )
 
 
+@dataclass(frozen=True, kw_only=True)
+class GraspLimits:
+    """Limits on sampled grasps, and on the motion of a held target in the hand.
+
+    Attributes:
+        approach_angle_deg: largest angle between the approach of sampled grasps and straight down;
+            180 for all directions.
+        tilt_limit_deg: largest turn in the hand; 180 for no limit.
+        slip_limit_mm: largest slide in the hand; infinite for no limit.
+    """
+
+    approach_angle_deg: float = DEFAULT_APPROACH_ANGLE_DEG
+    tilt_limit_deg: float = round(math.degrees(DEFAULT_TRIAL.tilt_limit), 9)
+    slip_limit_mm: float = round(1000.0 * DEFAULT_TRIAL.slip_limit, 9)
+
+
+DEFAULT_LIMITS: Mapping[TrialProtocol, GraspLimits] = {
+    "lift": GraspLimits(),
+    "shake": GraspLimits(approach_angle_deg=180.0, tilt_limit_deg=180.0, slip_limit_mm=math.inf),
+}
+"""Limits that apply unless settings say otherwise. None to shaking, as in ACRONYM: no table is in
+the way, and an object may move in the hand as long as both fingers touch it at the end."""
+
 Shared = TypeVar("Shared")
 
 
@@ -198,7 +221,8 @@ class EvaluationSettings:
         balanced_among: grasps that count for `until_balanced`, as in `trials.SelectionSettings`.
         max_grasps_per_object: with `until_balanced`, largest number of grasps per free instance.
         approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
-            above 0; 90 includes approaches from the side, 180 all directions.
+            above 0; 90 includes approaches from the side, 180 all directions. If None, 75 with
+            protocol `lift`, and 180 with `shake`.
         blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
             see `SamplingSettings`.
         only: names of free instances, or of objects for all their instances, whose grasps are
@@ -211,8 +235,10 @@ class EvaluationSettings:
         device: where an engine with parallel trials runs: `cuda:0` and so on, or `cpu`; all cards
             if None. It is recorded with the versions.
         tilt_limit_deg: a held target that turned in the hand by more than this since the grip ends
-            as `lifted_turned`, above 0; 180 for no limit.
-        slip_limit_mm: the same for a target that slid; infinite for no limit.
+            as `lifted_turned`, above 0; 180 for no limit. If None, 30 with protocol `lift`, and no
+            limit with `shake`.
+        slip_limit_mm: the same for a target that slid; infinite for no limit. If None, 20 with
+            protocol `lift`, and no limit with `shake`.
         approach: whether trials of the hand alone also simulate the straight approach from the
             pregrasp. Otherwise they begin with the open hand at the grasp. The whole arm always
             approaches.
@@ -228,6 +254,7 @@ class EvaluationSettings:
 
     Raises:
         InvalidInputError: no grasps are asked for, or a limit is not positive.
+        UnknownNameError: there is no such protocol.
     """
 
     grasps_per_object: int = setting(
@@ -247,9 +274,9 @@ class EvaluationSettings:
     max_grasps_per_object: int = setting(
         1000, "with {until_balanced}, at most N grasps on each object", low=1
     )
-    approach_angle_deg: float = setting(
-        DEFAULT_APPROACH_ANGLE_DEG,
-        "largest angle of the approach from straight down (default:"
+    approach_angle_deg: float | None = setting(
+        None,
+        "largest angle of the approach from straight down (default for objects on a table:"
         f" {DEFAULT_APPROACH_ANGLE_DEG:g}; 180: any)",
         name="approach_angle",
         metavar="DEG",
@@ -278,18 +305,20 @@ class EvaluationSettings:
         "with engine mujoco-gpu: cuda:0, cuda:1, ..., or cpu for a try (default: all cards)",
         metavar="DEVICE",
     )
-    tilt_limit_deg: float = setting(
-        round(math.degrees(DEFAULT_TRIAL.tilt_limit), 9),
-        "objects that turned more in the hand are lifted_turned (180: no limit)",
+    tilt_limit_deg: float | None = setting(
+        None,
+        "objects that turned more in the hand are lifted_turned (default for objects on a table:"
+        f" {GraspLimits.tilt_limit_deg:g}; 180: no limit)",
         name="tilt_limit",
         metavar="DEG",
         above=0,
         high=180,
         noun="an angle in degrees",
     )
-    slip_limit_mm: float = setting(
-        round(1000.0 * DEFAULT_TRIAL.slip_limit, 9),
-        "likewise for objects that slid (inf: no limit)",
+    slip_limit_mm: float | None = setting(
+        None,
+        "likewise for objects that slid (default for objects on a table:"
+        f" {GraspLimits.slip_limit_mm:g}; inf: no limit)",
         metavar="MM",
         above=0,
         infinite=True,
@@ -324,11 +353,16 @@ class EvaluationSettings:
             self._require_balance()
         else:
             self._require_no_balance()
-        if not 0.0 < self.tilt_limit_deg <= 180.0:
+        if self.protocol not in TRIAL_PROTOCOLS:
+            known = suggest_names(str(self.protocol), TRIAL_PROTOCOLS)
+            raise UnknownNameError(
+                f"protocol {quote_value(self.protocol)} does not exist; {known}"
+            ).about("protocol")
+        if self.tilt_limit_deg is not None and not 0.0 < self.tilt_limit_deg <= 180.0:
             raise InvalidInputError(
                 f"tilt_limit_deg is {self.tilt_limit_deg:g}; give more than 0 (180: no limit)"
             )
-        if not self.slip_limit_mm > 0.0:
+        if self.slip_limit_mm is not None and not self.slip_limit_mm > 0.0:
             raise InvalidInputError(
                 f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0 (inf: no limit)"
             )
@@ -362,6 +396,13 @@ class EvaluationSettings:
                 "until_balanced has to know all grasps, but a shard judges only some of"
                 " them; leave out one of the two"
             ).about("until_balanced", "shard")
+
+
+def grasp_limits(settings: EvaluationSettings) -> GraspLimits:
+    """The limits that apply: those that the settings give, else those of their protocol."""
+    names = GraspLimits.__dataclass_fields__
+    given = {name: value for name in names if (value := getattr(settings, name)) is not None}
+    return replace(DEFAULT_LIMITS[settings.protocol], **given)
 
 
 ROBUSTNESS_TESTS = ("tug", "shake", "friction", "noise")  # Names of the tests.

@@ -32,6 +32,13 @@ SHAKE_NUMBERS = ("shake_acceleration", "turn_acceleration", "shake_frequency", "
 """Recorded numbers of `ShakeSettings`; none of trials that lift."""
 
 
+LIFT_NUMBERS = (
+    *("lift_time", "hold_time", "creep_speed", "creep_distance", "steady_time"),
+    *("disturbance", "approach", *MEASURE_NUMBERS),
+)
+"""Recorded numbers besides those of the motion that have no effect on trials that shake."""
+
+
 def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
     """Limits, approach and protocol as fields of `EvaluationSettings`, from recorded numbers.
 
@@ -134,6 +141,13 @@ def other_numbers(values: Mapping[str, float]) -> dict[str, float]:
     """Recorded numbers without motion, limits, approach, shaking and measures."""
     known = ("tilt_limit", "slip_limit", "approach", *MEASURE_NUMBERS, *SHAKE_NUMBERS)
     return {name: value for name, value in without_motion(values).items() if name not in known}
+
+
+def effective_numbers(values: Mapping[str, float]) -> dict[str, float]:
+    """Recorded numbers that have an effect on trials of their protocol."""
+    if protocol_of(values) == "lift":
+        return dict(values)
+    return {k: value for k, value in without_motion(values).items() if k not in LIFT_NUMBERS}
 
 
 def recorded_motion_text(values: Mapping[str, float]) -> str:

@@ -491,6 +491,19 @@ def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibra
     return ObjectLibrary(load_document(file, LibraryDocument), file.parent)
 
 
+LibraryLike = ObjectLibrary | str | Path
+"""A loaded library, or an argument of `load_library`: a path, or the name of a built-in library."""
+
+
+def as_library(library: LibraryLike) -> ObjectLibrary:
+    """Returns a library, loaded if it is given by name.
+
+    Raises:
+        UnknownNameError, DocumentError: see `load_library`.
+    """
+    return library if isinstance(library, ObjectLibrary) else load_library(library)
+
+
 def package_name(name: str) -> str:
     """Makes a package name that is valid in ROS and Drake from a document's name."""
     return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "library"

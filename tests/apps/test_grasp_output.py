@@ -41,7 +41,7 @@ def test_files() -> None:
         grasp_output("x.yaml", None)
     with pytest.raises(UnknownNameError, match="did you mean 'acronym'"):
         grasp_output("x.h5", "acronim")
-    with pytest.raises(InvalidInputError, match="has grasps in the camera frame"):
+    with pytest.raises(InvalidInputError, match="have grasps in the camera frame"):
         grasp_output("x.npy", "graspnet", frame="object")
 
 

@@ -205,7 +205,10 @@ def test_an_object_without_grasps_is_said(
         (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach"),
         (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free instance 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
-        (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
+        (
+            ["tabletop_six", "-o", "x.csv"],
+            "have grasps in the world frame; write burg_drake's own format (--to burg_drake)",
+        ),
         (["tabletop_six", "--to", "acronim", "-o", "x.h5"], "there is no grasp format 'acronim'"),
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read no.npy"),
         (

@@ -62,7 +62,7 @@ def test_other_formats(grasp_file: Path, tmp_path: Path, capsys: Capture) -> Non
             (tmp_path / "x.yaml", "--to", "isaac_grasp"),
             "grasps of one object, and these are of 2 (box, can)",
         ),
-        ((tmp_path / "x.csv",), "VGN and GIGA has grasps in the world frame"),
+        ((tmp_path / "x.csv",), "VGN and GIGA have grasps in the world frame"),
         ((grasp_file / "x.h5",), "cannot write"),
     ):
         assert score(grasp_file, "-o", *options) == 2

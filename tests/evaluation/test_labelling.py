@@ -25,6 +25,7 @@ from burg_drake.evaluation import (
     ObjectLabels,
     assess_robustness,
     evaluate,
+    judge_again,
     label_library,
     load_run,
 )
@@ -37,6 +38,7 @@ from burg_drake.formats import (
 )
 from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import save_scene
 from burg_drake.station import Station, instance_pose, load_station
 
 SETTINGS = EvaluationSettings(
@@ -100,6 +102,7 @@ def test_each_object_that_can_be_held_gets_a_file_of_labels(labelled: list[Objec
 def test_a_file_says_who_labelled_it_and_how(labelled: list[ObjectLabels]) -> None:
     by = read_grasp_file(labelled[0].path, "acronym").grasps.provenance[LABELLED_BY]
     assert (by["engine"], by["protocol"], by["mode"]) == ("screening", "lift", "hand")
+    assert labelled[0].run.document.protocol == "lift"
     assert by["trial"] == labelled[0].run.document.trial
     assert by["versions"]["drake"]
 
@@ -209,6 +212,30 @@ def test_given_grasps_keep_their_labels_beside_the_new_ones(
         np.testing.assert_array_equal(again, found.success)
 
 
+def test_another_pose_of_the_object_is_told(
+    labelled: list[ObjectLabels],
+    library: ObjectLibrary,
+    station: Station,
+    judged_here: None,
+    tmp_path: Path,
+) -> None:
+    """The grasps come from a scene in which the cube lies on its side."""
+    document = labelled[0].run.scene().document
+    grasps = read_grasp_file(labelled[0].path, "acronym").grasps
+    for angle, notes in ((90.0, 1), (0.0, 0)):
+        (cube,) = document.instances
+        X_SO = Pose((0.2, 0.2, 0.1), rpy_deg=(angle, 0.0, 30.0))
+        scene = replace(document, library=str(library.root), instances=(replace(cube, X_SO=X_SO),))
+        save_scene(scene, tmp_path / f"{angle:g}.yaml")
+        given = replace(grasps, provenance={"scene": str(tmp_path / f"{angle:g}.yaml")})
+        out = tmp_path / f"labels_{angle:g}"
+        (found,) = label_library(
+            library, station, out, grasps=given, settings=SETTINGS, workers=1, progress=False
+        )
+        told = [note for note in found.notes if "stands in another pose than in" in note]
+        assert len(told) == notes
+
+
 def test_shaken_objects_are_alone_in_the_air(
     library: ObjectLibrary, judged_here: None, tmp_path: Path
 ) -> None:
@@ -244,14 +271,19 @@ def test_shaken_objects_are_not_those_of_a_robot(
         assess_robustness(found.run, progress=False)
     with pytest.raises(InvalidInputError, match="its objects were shaken"):
         plan_trials(found.run)
+    with pytest.raises(InvalidInputError, match="no confidence, so that none is contested"):
+        judge_again(found.run)
 
 
 def test_what_cannot_be_labelled_is_refused(
-    library: ObjectLibrary, station: Station, tmp_path: Path
+    labelled: list[ObjectLabels], library: ObjectLibrary, station: Station, tmp_path: Path
 ) -> None:
     def label(**more) -> ObjectLabels:
         return next(label_library(library, station, tmp_path / "out", progress=False, **more))
 
+    grasps = labelled[0].run.candidates.grasps
+    with pytest.raises(InvalidInputError, match="grasps are of cube, but those of heavy are to"):
+        label(settings=EvaluationSettings(only="heavy"), grasps=grasps)
     with pytest.raises(UnknownNameError, match=r"no object 'cub'.*cube"):
         label(settings=EvaluationSettings(only="cub"))
     with pytest.raises(InvalidInputError, match="in the camera frame"):
@@ -261,6 +293,28 @@ def test_what_cannot_be_labelled_is_refused(
             label(settings=EvaluationSettings(**more))
     assert not (tmp_path / "out").exists()
     assert "has no mass" in label(settings=EvaluationSettings(only="wall")).error
+
+
+def test_files_of_others_are_not_replaced(
+    labelled: list[ObjectLabels], library: ObjectLibrary, station: Station, tmp_path: Path
+) -> None:
+    """Neither those of the user nor those of a run."""
+    (tmp_path / "heavy.h5").write_text("mine")
+    for folder, why in (
+        (tmp_path, r"would replace heavy\.h5 in .*, which no earlier call"),
+        (labelled[0].run.path, "is the folder of a run; choose another folder"),
+    ):
+        with pytest.raises(InvalidInputError, match=why):
+            next(label_library(library, station, folder, settings=SETTINGS, progress=False))
+    assert [path.name for path in tmp_path.iterdir()] == ["heavy.h5"]
+
+
+def test_a_library_is_given_by_its_folder(
+    library: ObjectLibrary, station: Station, tmp_path: Path
+) -> None:
+    settings = EvaluationSettings(only="wall")
+    (found,) = label_library(library.root, station, tmp_path, settings=settings, progress=False)
+    assert "has no mass" in found.error
 
 
 def test_only_one_object_is_shaken_and_only_by_the_hand(station: Station, tmp_path: Path) -> None:

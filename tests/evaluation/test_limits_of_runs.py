@@ -11,12 +11,13 @@ from pathlib import Path
 import pytest
 import yaml
 
-from burg_drake.core import GraspSet, InvalidInputError, Outcome, grasp_from_axes
+from burg_drake.core import GraspSet, InvalidInputError, Outcome, UnknownNameError, grasp_from_axes
 from burg_drake.evaluation import (
     EvaluationSettings,
     Run,
     differences,
     evaluate,
+    grasp_limits,
     limit_settings,
     limits_text,
     load_run,
@@ -146,6 +147,20 @@ def test_what_is_no_limit(settings: dict[str, float], message: str) -> None:
         EvaluationSettings(**settings)
 
 
+def test_a_wrong_protocol_is_refused_with_the_right_one() -> None:
+    with pytest.raises(UnknownNameError, match=r"protocol 'shak' does not exist; .*shake"):
+        EvaluationSettings(protocol="shak")
+
+
+def test_shaken_objects_have_no_limits_unless_some_are_given() -> None:
+    shaken = grasp_limits(EvaluationSettings(protocol="shake"))
+    assert (shaken.approach_angle_deg, shaken.tilt_limit_deg) == (180.0, 180.0)
+    assert shaken.slip_limit_mm == math.inf
+    given = grasp_limits(EvaluationSettings(protocol="shake", tilt_limit_deg=30.0))
+    assert (given.tilt_limit_deg, given.slip_limit_mm) == (30.0, math.inf)
+    assert grasp_limits(dataclasses.replace(EvaluationSettings(), protocol="shake")) == shaken
+
+
 def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
     asked = EvaluationSettings(mode="arm", approach=True)
     with pytest.raises(InvalidInputError, match="mode arm"):
@@ -154,6 +169,6 @@ def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
 
 
 def test_the_usual_limits_are_those_of_trials() -> None:
-    asked = EvaluationSettings()
+    asked = grasp_limits(EvaluationSettings())
     assert math.radians(asked.tilt_limit_deg) == DEFAULT_TRIAL.tilt_limit
     assert asked.slip_limit_mm / 1000.0 == DEFAULT_TRIAL.slip_limit

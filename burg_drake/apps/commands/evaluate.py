@@ -45,6 +45,7 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) ->
     chosen: str = arguments.engine
     if arguments.rejudge is None:
         return chosen
+    refuse_rejudging_shaken(arguments)
     exists = evaluation.is_campaign(folder) or (Path(folder) / evaluation.RUN_FILE).exists()
     engine = evaluation.open_results(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
     if arguments.shard is not None:
@@ -54,6 +55,25 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: core.Mode) ->
         )
     evaluation.require_second_engine(chosen, engine, mode)
     return engine
+
+
+def refuse_rejudging_shaken(arguments: argparse.Namespace) -> None:
+    """Refuses --rejudge for objects that are shaken.
+
+    Raises:
+        InvalidInputError: it is given with --protocol shake.
+    """
+    if arguments.rejudge is not None and arguments.protocol == "shake":
+        raise core.InvalidInputError(
+            "--rejudge contested has no effect with --protocol shake: the verdicts of shaken"
+            " objects have no confidence, so that none is contested; leave it out"
+        )
+
+
+def settling_options(run: evaluation.Run) -> str:
+    """The options with which the command of a run settles its contested verdicts."""
+    finer = "mujoco" if run.document.engine.name == "reference" else "reference"
+    return f"--rejudge contested --engine {finer}"
 
 
 def second_opinion_line(columns: evaluation.Columns) -> str:
@@ -246,10 +266,9 @@ def add_evaluate_options(parser: options.Parser) -> None:
     options.add_cluster(workers_group)
     options.add_settings_options(parser, evaluation.EvaluationSettings, "table", "mode", "shard")
     options.add_settings_options(
-        parser,
-        evaluation.EvaluationSettings,
-        *("tilt_limit_deg", "slip_limit_mm", "approach", "protocol"),
+        parser, evaluation.EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", unset=True
     )
+    options.add_settings_options(parser, evaluation.EvaluationSettings, "approach", "protocol")
     options.add_motion_options(parser)
     options.add_retry_failed(parser, "grasps")
     parser.add_argument(
@@ -274,6 +293,8 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             f"{len(references)} scenes are given; name a folder for the run with -o RUN"
         )
     scene = None if several else load_scene(references[0])
+    if scene is not None:
+        _require_one_to_shake(arguments, scene)
     station = load_station(arguments.station)
     mode = evaluation.mode_for(station, arguments.mode)
     options.refuse_standoff_without_arm(arguments, mode)
@@ -305,6 +326,21 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     return report_campaign_failures(found)
 
 
+def _require_one_to_shake(arguments: argparse.Namespace, scene: Scene) -> None:
+    """Refuses to shake several objects, and names the command for them.
+
+    Raises:
+        InvalidInputError: there are several, and --protocol is shake.
+    """
+    count = len(scene.instances) + len(scene.background)
+    if arguments.protocol == "shake" and count > 1:
+        raise core.InvalidInputError(
+            f"scene {scene.name!r} has {count} objects, but with --protocol shake the hand holds"
+            " one that is alone; `burg-drake grasps label LIBRARY --protocol shake` shakes the"
+            " objects of a library, each by itself"
+        )
+
+
 def _grasps_of_scene(
     arguments: argparse.Namespace, scene: Scene, station: Station, mode: core.Mode
 ) -> Mapping[str, core.GraspSet] | None:
@@ -319,6 +355,8 @@ def _grasps_of_scene(
     warnings = require_valid_scene(scene, station)
     if mode != "hand":
         warnings += require_usable_arm(scene, station)
+    if arguments.protocol == "shake":
+        warnings = ()  # they are about objects that do not stand, but nothing falls
     for warning in warnings:
         print_warning(warning)
     return given.by_instance if given else None
@@ -365,10 +403,9 @@ def _print_run(run: evaluation.Run, motion: GraspMotion, *, rejudged: bool) -> N
     if rejudged or run.index.judged_again.any():
         print(second_opinion_line(run.columns(SECOND_OPINION_COLUMNS)))
     if contested := run.contested:
-        finer = "mujoco" if run.document.engine.name == "reference" else "reference"
         print(
             f"contested: {core.list_names(contested)}; judge them again by the same command with"
-            f" --rejudge contested --engine {finer}"
+            f" {settling_options(run)}"
         )
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")

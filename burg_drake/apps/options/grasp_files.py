@@ -338,8 +338,8 @@ def grasp_output(path: str, target: str | None, *, frame: str | None = None) -> 
         raise core.InvalidInputError(f"{error} (--to)") from error
     if frame is not None and format.frame != frame:
         raise core.InvalidInputError(
-            f"{format.title} has grasps in the {format.frame} frame; write a .h5 file, then convert"
-            " it with `burg-drake grasps convert`"
+            f"files of {format.title} have grasps in the {format.frame} frame; write burg_drake's"
+            " own format (--to burg_drake), then convert it with `burg-drake grasps convert`"
         )
     core.require_writable(out / "grasps" if is_folder else out)
     return GraspOutput(out, format, is_folder)

@@ -30,7 +30,7 @@ from burg_drake.evaluation.grasp_sets.pose_mistakes import check_corrections, co
 from burg_drake.evaluation.results_table import TEXT_COLUMNS
 from burg_drake.evaluation.run_folder import SCENE_FILE, STATION_FILE, Run, load_run
 from burg_drake.evaluation.table_file import is_table
-from burg_drake.evaluation.trial_origin import protocol_of
+from burg_drake.evaluation.trial_origin import effective_numbers, protocol_of
 from burg_drake.formats import (
     GRASP_FORMATS,
     GRASP_SUCCESS_COLUMN,
@@ -131,7 +131,7 @@ def run_grasps(run: Run) -> GraspSet:
         "engine": ", ".join(engines),
         "protocol": protocol_of(run.document.trial),
         "mode": run.document.mode,
-        "trial": run.document.trial,
+        "trial": effective_numbers(run.document.trial),
         "versions": run.document.versions,
     }
     return dataclasses.replace(

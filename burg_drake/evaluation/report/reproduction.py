@@ -20,7 +20,7 @@ from burg_drake.evaluation.run_document import (
     devices_of,
 )
 from burg_drake.evaluation.run_folder import GRASPS_FILE, RUN_FILE, STATION_FILE, Run
-from burg_drake.evaluation.settings import EvaluationSettings
+from burg_drake.evaluation.settings import DEFAULT_LIMITS, EvaluationSettings
 from burg_drake.evaluation.trial_origin import (
     engine_label,
     limit_settings,
@@ -106,7 +106,12 @@ def _settings_options(document: RunDocument | CampaignDocument, station: Path | 
             motion = replace(motion, standoff=usual.standoff)
         words += motion_options(motion, usual)
     limits = limit_settings(document.trial)
-    unusual = {k: v for k, v in limits.items() if v != getattr(EvaluationSettings, k)}
+    usual_limits = vars(DEFAULT_LIMITS[limits["protocol"]])
+    unusual = {
+        name: value
+        for name, value in limits.items()
+        if value != usual_limits.get(name, getattr(EvaluationSettings, name))
+    }
     words += _option_words(**unusual, engine=document.engine.name, seed=document.seed)
     if document.table != EvaluationSettings.table:
         words += _option_words(table=document.table)
