@@ -24,12 +24,14 @@ MakeScene = Callable[..., Scene]
 
 @pytest.fixture(scope="session")
 def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Box, block, ball, can, bar, post, a box that weighs 20 kg, and one that is too wide for most
-    hands; each stands on its origin, but for a bar that is 0.3 m away from it."""
+    """Box, block, ball, can, bar, post, wire, card, a box that weighs 20 kg, and one that is too
+    wide for most hands; each stands on its origin, but for a bar that is 0.3 m away from it."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     ball.apply_translation((0.0, 0.0, 0.03))
     can = trimesh.creation.cylinder(radius=0.03, height=0.1, sections=64)
     can.apply_translation((0.0, 0.0, 0.05))
+    wire = trimesh.creation.cylinder(radius=0.002, height=0.08, sections=64)
+    wire.apply_translation((0.0, 0.0, 0.04))
     far_bar = box_mesh((0.03, 0.30, 0.04)).apply_translation((0.0, 0.3, 0.0))
     sources = [
         ObjectSource(name="box", mesh=box_mesh(BOX), mass=BOX_MASS),
@@ -39,6 +41,8 @@ def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Pa
         ObjectSource(name="can", mesh=can, mass=0.2),
         ObjectSource(name="bar", mesh=box_mesh((0.03, 0.30, 0.04)), mass=0.2),
         ObjectSource(name="far_bar", mesh=far_bar, mass=0.2),
+        ObjectSource(name="wire", mesh=wire, mass=0.3),
+        ObjectSource(name="card", mesh=box_mesh((0.0005, 0.06, 0.06)), mass=0.3),
         ObjectSource(name="wide", mesh=box_mesh(WIDE), mass=BOX_MASS),
         ObjectSource(name="post", mesh=box_mesh(POST), mass=0.3),
     ]

@@ -41,8 +41,6 @@ COULOMB_MASS = 2 * FORCE * 0.08 / GRAVITY
 """With a coefficient of 0.08 the pads just carry this [kg]."""
 
 BAR_MASS, BAR_LENGTH = 0.2, 0.30
-LEVER = 0.05
-"""The bar is gripped so far beside its middle [m]."""
 STEEP_LIFT = 0.02
 STEEP = lifting(STEEP_LIFT, 1.4, hold_time=0.1)
 """Raises the hand by 20 mm, also at 0.04 m/s^2."""
@@ -148,6 +146,47 @@ def test_largest_mass_that_is_held(slow_trials, engine: str) -> None:
     assert not lost.outcome.held and held.outcome.held
 
 
+def press_and_rub(name: str) -> tuple[float, float]:
+    """What the pressure of a round object adds up to along the closing direction, and in all, over
+    a modulus of 1: of a strip of a pad's length, or of a disc."""
+    radius, length = {"ball": (0.03, 0.0), "can": (0.03, PAD[1]), "wire": (0.002, PAD[1])}[name]
+    angle = np.linspace(0.0, np.pi / 2, 20001)
+    width = 2 * radius * length if length else 2 * np.pi * radius**2 * np.sin(angle)
+    step, cosine = angle[1], np.cos(angle)
+
+    def pressed(depth: float) -> np.ndarray:
+        return STIFFNESS * np.maximum(depth - radius * (1.0 - cosine), 0.0) * width * step
+
+    depth = brentq(lambda d: float((pressed(d) * cosine).sum()) - FORCE, 1e-6, radius)
+    return float((pressed(depth) * cosine).sum()), float(pressed(depth).sum())
+
+
+@pytest.mark.parametrize(
+    ("name", "mass", "height", "tolerance"),
+    [
+        ("ball", 0.1, 0.03, 0.03),
+        thorough("can", 0.2, 0.07, 0.03),
+        ("wire", 0.3, 0.065, 0.08),
+        ("card", 0.3, 0.045, 0.03),
+    ],
+)
+def test_smallest_friction_that_holds_points_lines_and_walls(
+    make_scene: Callable[..., Scene], name: str, mass: float, height: float, tolerance: float
+) -> None:
+    """Coulomb's limit. Pads press on round objects from more than one side, on a wire by 8 % more
+    than on a card; its facets are coarse."""
+    trial = HandTrial(make_scene((name, 0.3, 0.2, 0.0)), make_station(), settings=SLOW)
+    along, whole = (1.0, 1.0) if name == "card" else press_and_rub(name)
+    limit = mass * GRAVITY / (2 * FORCE) * along / whole
+    lost, held = (
+        trial.run(name, from_above(height), friction=share * limit)
+        for share in (1.0 - tolerance, 1.0 + tolerance)
+    )
+    assert lost.margins.slip > 0.001 > held.margins.slip
+    assert held.outcome is Outcome.LIFTED
+    assert held.margins.pad_force == pytest.approx(FORCE, rel=0.01)
+
+
 # --- torsion ------------------------------------------------------------------------------------
 
 
@@ -192,21 +231,31 @@ def bar_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
     }
 
 
-BAR_FRICTION = limit_friction(*PAD, LEVER) * BAR_MASS * GRAVITY / (2 * FORCE)
-
-
 @pytest.mark.parametrize(
-    ("engine", "tolerance"),
-    [("standard", 0.06), thorough("mujoco", 0.06), thorough("screening", 0.12)],
+    ("engine", "tolerance", "mass", "lever"),
+    [
+        ("standard", 0.06, BAR_MASS, 0.05),
+        thorough("standard", 0.06, 0.1, 0.05),
+        ("standard", 0.06, 0.4, 0.02),
+        thorough("standard", 0.06, 0.4, 0.05),
+        thorough("mujoco", 0.06, BAR_MASS, 0.05),
+        thorough("mujoco", 0.06, 0.4, 0.02),
+        thorough("screening", 0.12, BAR_MASS, 0.05),
+    ],
 )
-def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance) -> None:
-    """Of what is above 1, the pad's eight triangles make 0.03, as they stand for the whole patch
-    with their middles; the rest is creep, as Drake's friction is slightly viscous."""
-    far_end = BAR_LENGTH / 2 + LEVER  # stays on the table while the bar turns in the hand
+def test_smallest_friction_that_keeps_a_bar_level(
+    bar_trials, engine: str, tolerance: float, mass: float, lever: float
+) -> None:
+    """By the weight alone, as the bar is lifted slowly. Of what is above 1, the triangles of the
+    pads' fronts make 0.03, as they stand for the whole patch with their middles; the rest is creep,
+    as Drake's friction is slightly viscous."""
+    far_end = BAR_LENGTH / 2 + lever  # stays on the table while the bar turns in the hand
+    limit = limit_friction(*PAD, lever) * mass * GRAVITY / (2 * FORCE)
 
     def tilt(share: float) -> float:
-        X_OG, friction = from_above(0.02, y=LEVER), share * BAR_FRICTION
-        return bar_trials[engine].run("bar", X_OG, friction=friction).margins.tilt
+        X_OG, friction = from_above(0.02, y=lever), share * limit
+        result = bar_trials[engine].run("bar", X_OG, friction=friction, mass=mass)
+        return result.margins.tilt
 
     assert tilt(0.9) == pytest.approx(STEEP_LIFT / far_end, rel=0.05)
     assert tilt(1.0 - tolerance) > np.deg2rad(2.5) > tilt(1.0 + tolerance)
