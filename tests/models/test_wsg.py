@@ -89,7 +89,7 @@ def test_fingers_mirror_each_other(diagram: RobotDiagram) -> None:
 
 
 def test_pads_are_tetrahedra_that_both_fingers_have_alike(diagram: RobotDiagram) -> None:
-    """28 of them fill the box, and its front, that alone is divided, looks at the other finger."""
+    """36 of them fill the box, and its front, that alone is divided, looks at the other finger."""
     plant, inspector = diagram.plant(), diagram.scene_graph().model_inspector()
     seen = []
     for finger, inwards in zip(FINGERS, (-1.0, 1.0), strict=True):
@@ -104,10 +104,10 @@ def test_pads_are_tetrahedra_that_both_fingers_have_alike(diagram: RobotDiagram)
         X_FP = inspector.GetPoseInFrame(pad)
         points = np.array([X_FP @ mesh.vertex(i) for i in range(mesh.num_vertices())])
         x = inwards * points[:, 0]
-        assert (np.isclose(x, x.max()).sum(), np.isclose(x, x.min()).sum()) == (12, 4)
+        assert (np.isclose(x, x.max()).sum(), np.isclose(x, x.min()).sum()) == (16, 4)
         seen.append((points, [[t.vertex(i) for i in range(4)] for t in mesh.tetrahedra()]))
     (left, cells), (right, other) = seen
-    assert len(cells) == 28
+    assert len(cells) == 36
     assert other == cells
     np.testing.assert_allclose(left * (-1.0, -1.0, 1.0), right, atol=1e-12)
 
