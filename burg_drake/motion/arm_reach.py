@@ -55,13 +55,16 @@ class HandVerdicts:
     Attributes:
         blocked_by: (N, 2) verdict that names the first obstacle; None where the hand is free.
         clearance: (N, 2) clearance of the hand on its path, negative where it is not free [m].
+        room: (N, 2) see `SweepResult` [m].
     """
 
     blocked_by: NDArray[np.object_]
     clearance: Array
+    room: Array
 
     def __getitem__(self, chosen: Indices) -> HandVerdicts:
-        return HandVerdicts(self.blocked_by[chosen].copy(), self.clearance[chosen].copy())
+        values = (self.blocked_by, self.clearance, self.room)
+        return HandVerdicts(*(value[chosen].copy() for value in values))
 
     @property
     def blocked(self) -> NDArray[np.bool_]:
@@ -79,6 +82,7 @@ class HandVerdicts:
         blocked = np.minimum(sweep.clearance, -CONTACT_TOLERANCE)
         room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
         self.clearance[rows, flip] = np.minimum(self.clearance[rows, flip], room)
+        self.room[rows, flip] = np.minimum(self.room[rows, flip], sweep.room)
         for k in np.flatnonzero(~sweep.free):
             self.blocked_by[rows[k], flip] = Reach(
                 outcome, str(sweep.blocker[k]), float(sweep.clearance[k])
@@ -110,7 +114,8 @@ class HandPaths:
     def check_before_lift(self) -> HandVerdicts:
         """Checks approach and retreat."""
         shape = self.X_both.shape[:2]
-        found = HandVerdicts(np.full(shape, None, dtype=object), np.full(shape, np.inf))
+        nothing = np.full(shape, None, dtype=object)
+        found = HandVerdicts(nothing, np.full(shape, np.inf), np.full(shape, np.inf))
         for name, flip, rows in self._list_checks(found):
             sweep = self.sweep.approach(name, self.X_both[rows, flip])
             found.record(flip, rows, sweep, Outcome.HAND_COLLISION_APPROACH)
@@ -140,6 +145,7 @@ class HandPaths:
     def _copy_if_symmetric(self, found: HandVerdicts) -> HandVerdicts:
         if self.sweep.symmetric:
             found.clearance[:, 1] = found.clearance[:, 0]
+            found.room[:, 1] = found.room[:, 0]
             found.blocked_by[:, 1] = found.blocked_by[:, 0]
         return found
 
@@ -398,8 +404,10 @@ class ArmReach:
         for k in range(0, len(left), size):
             part = left[k : k + size]
             X_WG, clearance = paths.X_both[part], hand.clearance[part]
-            search = self._searches[height].begin(self._X_AW @ X_WG, clearance)
-            grasps = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
+            room = np.minimum(clearance, hand.room[part])
+            search = self._searches[height].begin(self._X_AW @ X_WG, room)
+            names, width = paths.instance[part].tolist(), paths.width[part]
+            grasps = GraspBatch(names, X_WG, width, clearance, room)
             verdicts = MotionSearch(grasps, search, self._tree, self.settings).run()
             for index, verdict in zip(part.tolist(), verdicts, strict=True):
                 reached = verdict.outcome is None

@@ -107,8 +107,8 @@ class LineSearch(Protocol):
         Args:
             X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with both finger assignments. Their
                 order does not depend on how a grasp was given.
-            clearance: (N, 2) clearance of the hand on its path [m]; the hand may deviate from the
-                straight segment by a fraction of it.
+            clearance: (N, 2) room of the hand on its path [m], see `GraspBatch.room`; the hand may
+                deviate from the straight segment by a fraction of it.
         """
         ...
 

@@ -37,12 +37,15 @@ class GraspBatch:
         X_WG: (N, 2, 4, 4) grasps in the world with both finger assignments.
         width: (N,) distance between the pads that hold the target [m]; NaN if it is not known.
         clearance: (N, 2) clearance of the hand on its path [m]; negative where it is not free.
+        room: (N, 2) the smaller of that clearance and the depth that the held target may still get
+            into bodies that it touches or overlaps at the start [m].
     """
 
     instance: Sequence[str]
     X_WG: Array
     width: Array
     clearance: Array
+    room: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +201,7 @@ class MotionSearch:
                 approach=chain.q[: grasp_row + 1],
                 retreat=chain.q[grasp_row : lift_row + 1] if lift_row > grasp_row else None,
                 lift=chain.q[lift_row:],
-                clearance=hand,
+                clearance=float(self._grasps.room[grasp, chain.flip]),
             )
             clearance = max(0.0, min(hand, float(chain.lower.min())))
             found[grasp] = Reach(None, clearance=clearance, path=path)

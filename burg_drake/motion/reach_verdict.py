@@ -24,8 +24,9 @@ class ArmPath:
         lift: (L, n) rows along the lift; a single one if the lift has no height.
         retreat: (J, n) rows from the grasp straight back along the approach, with the target;
             None if the lift begins at the grasp.
-        clearance: lower bound of the clearance of the hand and the held target on approach,
-            retreat and lift [m]; NaN if it is not known.
+        clearance: lower bound of the clearance of the hand on approach, retreat and lift; where
+            the held target touches or overlaps a body at the start, at most the depth that it may
+            still get into it [m]. NaN if it is not known.
     """
 
     X_WG: Array
