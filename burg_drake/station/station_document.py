@@ -193,7 +193,7 @@ class Arm:
         for name in ("velocity", "acceleration", "jerk"):
             if min(getattr(self, name) or (1.0,)) < min_limit:
                 raise FieldError(f"arm {name} limits must be {min_limit:g} or more", name)
-        if self.X_FH == _PandaMount() and self.flange != PANDA_FLANGE:
+        if isinstance(self.X_FH, _PandaMount) and self.flange != PANDA_FLANGE:
             raise FieldError(
                 f"X_FH is missing, and only a Panda's {PANDA_FLANGE!r} has a usual one; give the"
                 f" pose of the hand's body in the frame of {self.flange!r}: X_FH: {{}} if the two"
