@@ -50,9 +50,12 @@ class Reach:
             segments [m]; 0 if they are only known to be free. After a failure, clearance from the
             blocker, negative if it overlaps; NaN without a blocker.
         excess: how far the best configuration is beyond a joint limit, less
-            `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason.
+            `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason. If a segment
+            fails, that of the pose with the largest one of those that no motion reaches.
         path: the motion; None after a failure.
         lift: length of the lift [m]; NaN after a failure.
+        reason: why the arm cannot follow a segment, where neither an obstacle nor a joint limit is
+            the reason; or "".
     """
 
     outcome: Outcome | None
@@ -61,6 +64,7 @@ class Reach:
     excess: float = np.nan
     path: ArmPath | None = None
     lift: float = np.nan
+    reason: str = ""
 
     @property
     def q_grasp(self) -> Array | None:
