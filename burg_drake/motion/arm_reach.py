@@ -42,6 +42,7 @@ from burg_drake.motion.motion_settings import ReachSettings
 from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.numeric_lines import NumericLineSearch
 from burg_drake.motion.panda_ik import PandaIk
+from burg_drake.motion.posture_grid import PREFERRED_CLEARANCE
 from burg_drake.motion.reach_verdict import Reach
 from burg_drake.motion.roadmap import postures_over_objects
 from burg_drake.scene import SceneLike, as_scene
@@ -158,9 +159,13 @@ LevelIsFree = Callable[[int, Indices], Booleans]
 """Whether rows (S,) are free up to a level."""
 
 
+LIFT_STEP = 0.01
+"""Metres between the heights of shortened lifts that are tried."""
+
+
 def lift_heights(shortest: float, whole: float) -> Array:
-    """Heights to try, rising from `shortest` to `whole` in steps of 1 cm [m]."""
-    rising = np.arange(shortest, whole - 1e-9, 0.01)
+    """Heights to try, rising from `shortest` to `whole` in steps of `LIFT_STEP` [m]."""
+    rising = np.arange(shortest, whole - 1e-9, LIFT_STEP)
     rising[1:] = np.round(rising[1:], 9)  # sums of steps have rounding errors
     return np.append(rising, whole)
 
@@ -168,7 +173,10 @@ def lift_heights(shortest: float, whole: float) -> Array:
 def raise_lifts(
     whole: Sequence[Reach], heights: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
-    """Searches the largest free lift of grasps for which the whole lift is not free.
+    """Searches the largest lift of grasps for which the whole lift is not free.
+
+    A lift ends `PREFERRED_CLEARANCE` before the height at which an obstacle stops the hand or, where
+    that is lower, the arm; but it is at least the lowest height.
 
     Args:
         whole: N verdicts with the whole lift.
@@ -177,8 +185,8 @@ def raise_lifts(
         hand_is_free: checks the hand alone at other heights.
 
     Returns:
-        N verdicts. If the lowest height is free: success with the largest free height found and
-        the obstacle of the whole lift as `blocker`. Otherwise: the failure at the lowest height.
+        N verdicts. If the lowest height is free: success with the largest height found and the
+        obstacle of the whole lift as `blocker`. Otherwise: the failure at the lowest height.
     """
     # Outcomes that a lower lift does not change.
     height_independent = (
@@ -187,6 +195,7 @@ def raise_lifts(
         Outcome.NO_IK,
         Outcome.JOINT_LIMIT,
     )
+    reserve = round(PREFERRED_CLEARANCE / LIFT_STEP)  # levels
     found = list(whole)
     grasps = _true_indices(
         reach.outcome is not None and reach.outcome not in height_independent for reach in whole
@@ -210,12 +219,17 @@ def raise_lifts(
     )
     # The arm can often lift as high as the hand alone.
     guess = np.full(len(grasps), -1)
-    guess[hand_blocked] = np.maximum(free, 0)
+    guess[hand_blocked] = np.maximum(free - reserve, 0)
     high[hand_blocked] = guess[hand_blocked] + 1
     low, high = _narrow_levels(low, high, guess, is_reachable)
     # If the lowest height is not free, no height is.
     low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), is_reachable)
-    _bisect_levels(low, high, is_reachable)
+    low, _ = _bisect_levels(low, high, is_reachable)
+    is_kept = (low == guess) & (low >= 0)  # The reserve is that of the hand.
+    stopped = np.array([whole[k].blocker != "" for k in grasps], dtype=bool)
+    short = np.flatnonzero(~is_kept & stopped & (low > 0))
+    for level in np.unique(low[short]).tolist():
+        is_reachable(max(level - reserve, 0), short[low[short] == level])
     return found
 
 
