@@ -175,8 +175,8 @@ def raise_lifts(
 ) -> list[Reach]:
     """Searches the largest lift of grasps for which the whole lift is not free.
 
-    A lift ends `PREFERRED_CLEARANCE` before the height at which an obstacle stops the hand or, where
-    that is lower, the arm; but it is at least the lowest height.
+    A lift ends `PREFERRED_CLEARANCE` before the height at which an obstacle stops the hand or,
+    where that is lower, the arm; but it is at least the lowest height.
 
     Args:
         whole: N verdicts with the whole lift.

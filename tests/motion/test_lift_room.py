@@ -50,12 +50,13 @@ def test_the_largest_height_with_a_reserve_is_found() -> None:
     for k, reach in enumerate(MadeUp(hand, arm).found()):
         room = TRIED[min(hand[k], arm[k]) >= TRIED]
         if len(room):
-            of_hand = max((TRIED <= hand[k]).sum() - 1, 1)
-            of_arm = max((TRIED <= arm[k]).sum() - 1, 1)
-            count = len(TRIED) if len(room) == len(TRIED) else of_arm
-            if hand[k] < 0.3 and (TRIED <= arm[k]).sum() >= of_hand:
-                count = of_hand
-            assert reach.outcome is None and reach.lift == TRIED[count - 1]
+            with_hand = TRIED[max((hand[k] >= TRIED).sum() - 2, 0)]
+            with_arm = TRIED[max((arm[k] >= TRIED).sum() - 2, 0)]
+            stopped_by_hand = hand[k] < TRIED[-1] and arm[k] >= with_hand
+            expected = with_hand if stopped_by_hand else with_arm
+            if len(room) == len(TRIED):
+                expected = TRIED[-1]
+            assert reach.outcome is None and reach.lift == expected
             whole = HAND if hand[k] < 0.3 else ARM
             assert reach.blocker == ("" if len(room) == len(TRIED) else whole.blocker)
         else:  # what is said is that of the least height
