@@ -64,8 +64,8 @@ class HandVerdicts:
     room: Array
 
     def __getitem__(self, chosen: Indices) -> HandVerdicts:
-        values = (self.blocked_by, self.clearance, self.room)
-        return HandVerdicts(*(value[chosen].copy() for value in values))
+        clearance, room = self.clearance[chosen].copy(), self.room[chosen].copy()
+        return HandVerdicts(self.blocked_by[chosen].copy(), clearance, room)
 
     @property
     def blocked(self) -> NDArray[np.bool_]:

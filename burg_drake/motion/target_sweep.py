@@ -38,8 +38,8 @@ class PathBlockers:
 
     def repeated(self, n: int) -> PathBlockers:
         """Repeats the single path n times."""
-        values = (self.by, self.depth, self.at, self.room)
-        return PathBlockers(*(np.repeat(value, n) for value in values))
+        depth, at, room = (np.repeat(value, n) for value in (self.depth, self.at, self.room))
+        return PathBlockers(np.repeat(self.by, n), depth, at, room)
 
 
 MIN_STRAIGHTNESS = 2e-5
@@ -121,6 +121,8 @@ class TargetSweep:
         length: float,
     ) -> None:
         """Enters the body into `found` for the paths (S,) on which it is penetrated too deeply."""
+        if not len(rows):
+            return
         places = np.linspace(0.0, length, int(np.ceil(length / 1e-3)) + 1)
         size = max(1, 2**17 // len(places))  # bounds the memory to about 20 MB
         allowed = self._allowed(name)
@@ -165,7 +167,8 @@ class TargetSweep:
             """Pairs of neighbouring samples of rows (R, P) between which depths may decide."""
             limit = 0.5 * (depth[path] + allowed + PATH_RESERVE) + CONTACT_TOLERANCE
             limit[depth[path] > allowed] = np.inf
-            return np.nonzero(0.5 * (d[:, :-1] + d[:, 1:] + step) > limit[:, None])
+            row, piece = np.nonzero(0.5 * (d[:, :-1] + d[:, 1:] + step) > limit[:, None])
+            return row, piece
 
         step = places[1] - places[0] if len(places) > 1 else 0.0
         path, first = may_matter(np.arange(len(depth)), depths)
