@@ -89,7 +89,7 @@ def _blocking_postures(
         if blocked.any():
             break
     else:
-        layers = range(layer, search.hand_path.segment_end(layer) + 1)
+        layers = {layer, search.hand_path.segment_end(layer)}
         return Failure.of_line(outcome, max(_limit_excess(search, X_AG, k) for k in layers))
     where = np.argwhere(blocked)
     order = np.argsort(-grid.upper[layer, i][blocked], kind="stable")[

@@ -72,8 +72,8 @@ class Failure:
 
         Args:
             outcome: `APPROACH_LINE`, `RETREAT_LINE` or `LIFT_LINE`.
-            excess: smallest excess of a configuration at a pose that no chain reaches [rad or m],
-                the largest of all these poses; infinite if one has none even without limits.
+            excess: smallest excess of a configuration at the first and the last pose that no chain
+                reaches [rad or m], the larger one; infinite if one has none even without limits.
         """
         if 0.0 < excess < np.inf:
             return cls(outcome, excess=excess)

@@ -444,7 +444,7 @@ class _NumericBatch:
 
     def _explain_line(self, grasp: int, stage: int) -> Failure:
         """Failure on a segment: the colliding postures there; without any, the excess over the
-        joint limits at the poses that no candidate reaches, or the reason."""
+        joint limits at the ends of what no candidate reaches, or the reason."""
         outcome, candidates = dict(SEGMENT_STAGES)[stage], self._candidates[grasp]
         found = self._explain(outcome, candidates, stage)
         if len(found.q):
@@ -457,7 +457,8 @@ class _NumericBatch:
         else:
             absent = absent[absent > (at_grasp if stage == RETREAT else path.at_retreated)]
             absent = absent[absent <= path.segment_end(int(absent[0]))] if len(absent) else absent
-        excesses = [self._limit_excess(grasp, layer) for layer in absent.tolist()]
+        ends = {*absent[:1].tolist(), *absent[-1:].tolist()}
+        excesses = [self._limit_excess(grasp, layer) for layer in ends]
         return Failure.of_line(outcome, max(excesses, default=0.0))
 
     def _limit_failure(self, grasp: int, layer: int) -> Failure:

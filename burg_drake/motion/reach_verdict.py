@@ -51,7 +51,7 @@ class Reach:
             blocker, negative if it overlaps; NaN without a blocker.
         excess: how far the best configuration is beyond a joint limit, less
             `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason. If a segment
-            fails, that of the pose with the largest one of those that no motion reaches.
+            fails, the larger one of the first and the last pose that no motion reaches.
         path: the motion; None after a failure.
         lift: length of the lift [m]; NaN after a failure.
         reason: why the arm cannot follow a segment, where neither an obstacle nor a joint limit is
