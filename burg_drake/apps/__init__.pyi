@@ -27,6 +27,7 @@ from .options.arguments import (
 )
 from .options.evaluated_grasps import (
     add_motion_options as add_motion_options,
+    describe_motion_remedy as describe_motion_remedy,
     motion_from_options as motion_from_options,
     read_grasps_from_options as read_grasps_from_options,
 )

@@ -24,6 +24,7 @@ InstanceStatus = Literal[
 
 STATUS_OF_ISSUE: Mapping[str, InstanceStatus] = {
     "overlap": "collision",
+    "obstacle_overlap": "collision",
     "surface_overlap": "collision",
     "in_ground": "in_ground",
     "sunken": "sunken",

@@ -442,9 +442,11 @@ def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
     """Folders of the packages that a model and its included models name, by package name.
 
     Raises:
+        InvalidInputError: the model is xacro.
         UnknownNameError: a package is not found; the message names the file and the searched
             places.
     """
+    _require_expanded(model)
     if not may_reference_packages(model):
         return {}  # most models; some name many files
     found: dict[str, Path] = {}
@@ -459,6 +461,28 @@ def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
             except UnknownNameError as error:
                 raise UnknownNameError(f"{file} refers to {reference}: {error}") from error
     return found
+
+
+XACRO_MARK = re.compile(rb"<(xacro:\w+)|=\s*[\"'][^\"'<>]*(\$[({][^\"'<>)}]*[)}]?)")
+"""Elements and values of attributes that xacro replaces when it makes a URDF."""
+XML_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+
+
+def _require_expanded(model: Path) -> None:
+    """Rejects a URDF that still has to be expanded by xacro."""
+    text = read_bytes(model, FileLimits.document.size)
+    if b"<xacro:" not in text and b"$" not in text:
+        return  # nearly all models
+    text = XML_COMMENT.sub(lambda comment: b"\n" * comment[0].count(b"\n"), text)
+    if found := XACRO_MARK.search(text):
+        line = text.count(b"\n", 0, found.start()) + 1
+        name = model.name.removesuffix(".xacro").removesuffix(".urdf")
+        target = f"{name}.urdf" if model.suffix == ".xacro" else f"{name}_expanded.urdf"
+        what = (found[1] or found[2]).decode(errors="replace")
+        raise InvalidInputError(
+            f"{model}:{line}: {what!r} is xacro, not URDF; expand the file first, and"
+            f" name the new one: xacro {model.name} > {target}"
+        )
 
 
 def may_reference_packages(model: Path) -> bool:

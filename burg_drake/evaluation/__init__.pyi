@@ -311,7 +311,10 @@ from .run_preparation import (
     sample_requested as sample_requested,
 )
 from .run_summary import (
+    MotionRemedy as MotionRemedy,
     missing_grasps_note as missing_grasps_note,
+    motion_remedy as motion_remedy,
+    remedy_of_run as remedy_of_run,
     run_notes as run_notes,
     summarize as summarize,
     unclear_notes as unclear_notes,

@@ -431,6 +431,7 @@ def _reach_decision(result: Reach, motions: bool) -> Decision:
     return Decision(
         result.outcome,
         blocker=result.blocker,
+        reason=result.reason,
         margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
         q_grasp=() if result.q_grasp is None else tuple(result.q_grasp.tolist()),
         q_pregrasp=() if result.q_pregrasp is None else tuple(result.q_pregrasp.tolist()),

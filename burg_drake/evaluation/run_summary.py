@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,7 +54,8 @@ def run_notes(run: Run) -> tuple[str, ...]:
 
     They name usual mistakes in given grasps, instances with fewer grasps than asked for or with
     none given, several devices and, once its grasps are judged, each object without executed
-    grasps, or with too few lifted or failing grasps for a balanced run.
+    grasps, or with too few lifted or failing grasps for a balanced run; and a lift or retreat on
+    which most grasps fail.
     """
     grasps = run.document.grasps
     missing = ""
@@ -68,6 +69,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
         *_protocol_notes(run),
         *_device_notes(run),
         *_unexecuted_notes(run),
+        *_motion_notes(run),
         *_balance_notes(run),
     )
 
@@ -173,6 +175,65 @@ def _motion_remedy(outcome: Outcome, motion: GraspMotion) -> str:
     if outcome in retreat_outcomes:
         motions.append("a shorter retreat")
     return " or ".join(motions)
+
+
+@dataclass(frozen=True)
+class MotionRemedy:
+    """A shorter motion of the hand that may make more grasps reachable.
+
+    Attributes:
+        text: what most grasps fail on, and what may help; one sentence.
+        setting: the field of `GraspMotion` to change.
+        value: its new value [m].
+    """
+
+    text: str
+    setting: Literal["least_lift", "retreat"]
+    value: float
+
+
+def motion_remedy(outcomes: Iterable[str], motion: GraspMotion) -> MotionRemedy | None:
+    """What may help if most grasps at which the open hand is clear fail on the lift or the retreat.
+
+    Args:
+        outcomes: the outcome of each grasp.
+        motion: motion of the hand.
+
+    Returns:
+        The shorter lift or retreat; None if most grasps fail on neither, or it is short already.
+    """
+    short_lift, min_retreat = 0.02, 0.02  # Metres.
+    counts = Counter(map(Outcome, outcomes))
+    clear = sum(n for outcome, n in counts.items() if outcome.stage is not Stage.CLEAR)
+    of_lift = counts[Outcome.HAND_COLLISION_LIFT] + counts[Outcome.LIFT_LINE]
+    of_retreat = counts[Outcome.HAND_COLLISION_RETREAT] + counts[Outcome.RETREAT_LINE]
+    grasps = count_with_noun(clear, "grasp")
+    if 2 * of_lift > clear and motion.shortest > short_lift:
+        text = (
+            f"{of_lift:,} of {grasps} fail on the lift of {1e3 * motion.shortest:g} mm; one as high"
+            f" as there is room, at least {1e3 * short_lift:g} mm, may help"
+        )
+        return MotionRemedy(text, "least_lift", short_lift)
+    if 2 * of_retreat > clear and motion.retreat > min_retreat:
+        shorter = round(motion.retreat / 2.0, 3)
+        text = (
+            f"{of_retreat:,} of {grasps} fail on the retreat of {1e3 * motion.retreat:g} mm; one of"
+            f" {1e3 * shorter:g} mm may help"
+        )
+        return MotionRemedy(text, "retreat", shorter)
+    return None
+
+
+def remedy_of_run(run: Run) -> MotionRemedy | None:
+    """`motion_remedy` of the grasps of a run that are judged so far."""
+    outcome = run.rows().codes("outcome")
+    names = np.array(outcome.names, dtype=object)[outcome.codes]
+    return motion_remedy(names.tolist(), read_motion(run.document.trial))
+
+
+def _motion_notes(run: Run) -> list[str]:
+    remedy = remedy_of_run(run)
+    return [remedy.text] if remedy else []
 
 
 def unclear_notes(

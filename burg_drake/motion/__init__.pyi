@@ -49,8 +49,10 @@ from .line_poses import (
 )
 from .line_search import (
     Chain as Chain,
+    Failure as Failure,
     LineSearch as LineSearch,
     LineSearchBatch as LineSearchBatch,
+    SuccessiveLineSearch as SuccessiveLineSearch,
 )
 from .line_timing import line_error as line_error
 from .motion_settings import ReachSettings as ReachSettings, TimingSettings as TimingSettings

@@ -42,6 +42,7 @@ from burg_drake.motion.motion_settings import ReachSettings
 from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.numeric_lines import NumericLineSearch
 from burg_drake.motion.panda_ik import PandaIk
+from burg_drake.motion.posture_grid import PREFERRED_CLEARANCE
 from burg_drake.motion.reach_verdict import Reach
 from burg_drake.motion.roadmap import postures_over_objects
 from burg_drake.scene import SceneLike, as_scene
@@ -55,13 +56,16 @@ class HandVerdicts:
     Attributes:
         blocked_by: (N, 2) verdict that names the first obstacle; None where the hand is free.
         clearance: (N, 2) clearance of the hand on its path, negative where it is not free [m].
+        room: (N, 2) see `SweepResult` [m].
     """
 
     blocked_by: NDArray[np.object_]
     clearance: Array
+    room: Array
 
     def __getitem__(self, chosen: Indices) -> HandVerdicts:
-        return HandVerdicts(self.blocked_by[chosen].copy(), self.clearance[chosen].copy())
+        clearance, room = self.clearance[chosen].copy(), self.room[chosen].copy()
+        return HandVerdicts(self.blocked_by[chosen].copy(), clearance, room)
 
     @property
     def blocked(self) -> NDArray[np.bool_]:
@@ -79,6 +83,7 @@ class HandVerdicts:
         blocked = np.minimum(sweep.clearance, -CONTACT_TOLERANCE)
         room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
         self.clearance[rows, flip] = np.minimum(self.clearance[rows, flip], room)
+        self.room[rows, flip] = np.minimum(self.room[rows, flip], sweep.room)
         for k in np.flatnonzero(~sweep.free):
             self.blocked_by[rows[k], flip] = Reach(
                 outcome, str(sweep.blocker[k]), float(sweep.clearance[k])
@@ -110,7 +115,8 @@ class HandPaths:
     def check_before_lift(self) -> HandVerdicts:
         """Checks approach and retreat."""
         shape = self.X_both.shape[:2]
-        found = HandVerdicts(np.full(shape, None, dtype=object), np.full(shape, np.inf))
+        nothing = np.full(shape, None, dtype=object)
+        found = HandVerdicts(nothing, np.full(shape, np.inf), np.full(shape, np.inf))
         for name, flip, rows in self._list_checks(found):
             sweep = self.sweep.approach(name, self.X_both[rows, flip])
             found.record(flip, rows, sweep, Outcome.HAND_COLLISION_APPROACH)
@@ -140,6 +146,7 @@ class HandPaths:
     def _copy_if_symmetric(self, found: HandVerdicts) -> HandVerdicts:
         if self.sweep.symmetric:
             found.clearance[:, 1] = found.clearance[:, 0]
+            found.room[:, 1] = found.room[:, 0]
             found.blocked_by[:, 1] = found.blocked_by[:, 0]
         return found
 
@@ -152,9 +159,13 @@ LevelIsFree = Callable[[int, Indices], Booleans]
 """Whether rows (S,) are free up to a level."""
 
 
+LIFT_STEP = 0.01
+"""Metres between the heights of shortened lifts that are tried."""
+
+
 def lift_heights(shortest: float, whole: float) -> Array:
-    """Heights to try, rising from `shortest` to `whole` in steps of 1 cm [m]."""
-    rising = np.arange(shortest, whole - 1e-9, 0.01)
+    """Heights to try, rising from `shortest` to `whole` in steps of `LIFT_STEP` [m]."""
+    rising = np.arange(shortest, whole - 1e-9, LIFT_STEP)
     rising[1:] = np.round(rising[1:], 9)  # sums of steps have rounding errors
     return np.append(rising, whole)
 
@@ -162,7 +173,10 @@ def lift_heights(shortest: float, whole: float) -> Array:
 def raise_lifts(
     whole: Sequence[Reach], heights: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
-    """Searches the largest free lift of grasps for which the whole lift is not free.
+    """Searches the largest lift of grasps for which the whole lift is not free.
+
+    A lift ends `PREFERRED_CLEARANCE` before the height at which an obstacle stops the hand or,
+    where that is lower, the arm; but it is at least the lowest height.
 
     Args:
         whole: N verdicts with the whole lift.
@@ -171,8 +185,8 @@ def raise_lifts(
         hand_is_free: checks the hand alone at other heights.
 
     Returns:
-        N verdicts. If the lowest height is free: success with the largest free height found and
-        the obstacle of the whole lift as `blocker`. Otherwise: the failure at the lowest height.
+        N verdicts. If the lowest height is free: success with the largest height found and the
+        obstacle of the whole lift as `blocker`. Otherwise: the failure at the lowest height.
     """
     # Outcomes that a lower lift does not change.
     height_independent = (
@@ -181,6 +195,7 @@ def raise_lifts(
         Outcome.NO_IK,
         Outcome.JOINT_LIMIT,
     )
+    reserve = round(PREFERRED_CLEARANCE / LIFT_STEP)  # levels
     found = list(whole)
     grasps = _true_indices(
         reach.outcome is not None and reach.outcome not in height_independent for reach in whole
@@ -204,12 +219,17 @@ def raise_lifts(
     )
     # The arm can often lift as high as the hand alone.
     guess = np.full(len(grasps), -1)
-    guess[hand_blocked] = np.maximum(free, 0)
+    guess[hand_blocked] = np.maximum(free - reserve, 0)
     high[hand_blocked] = guess[hand_blocked] + 1
     low, high = _narrow_levels(low, high, guess, is_reachable)
     # If the lowest height is not free, no height is.
     low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), is_reachable)
-    _bisect_levels(low, high, is_reachable)
+    low, _ = _bisect_levels(low, high, is_reachable)
+    is_kept = (low == guess) & (low >= 0)  # The reserve is that of the hand.
+    stopped = np.array([whole[k].blocker != "" for k in grasps], dtype=bool)
+    short = np.flatnonzero(~is_kept & stopped & (low > 0))
+    for level in np.unique(low[short]).tolist():
+        is_reachable(max(level - reserve, 0), short[low[short] == level])
     return found
 
 
@@ -398,8 +418,10 @@ class ArmReach:
         for k in range(0, len(left), size):
             part = left[k : k + size]
             X_WG, clearance = paths.X_both[part], hand.clearance[part]
-            search = self._searches[height].begin(self._X_AW @ X_WG, clearance)
-            grasps = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
+            room = np.minimum(clearance, hand.room[part])
+            search = self._searches[height].begin(self._X_AW @ X_WG, room)
+            names, width = paths.instance[part].tolist(), paths.width[part]
+            grasps = GraspBatch(names, X_WG, width, clearance, room)
             verdicts = MotionSearch(grasps, search, self._tree, self.settings).run()
             for index, verdict in zip(part.tolist(), verdicts, strict=True):
                 reached = verdict.outcome is None

@@ -15,6 +15,7 @@ import numpy as np
 from burg_drake.core import Array, Indices, Outcome
 from burg_drake.motion.line_poses import ClosedFormFiller, DenseRows, NumericFiller, straighten_rows
 from burg_drake.motion.line_search import Chain, Failure
+from burg_drake.motion.panda_ik import PandaIk
 from burg_drake.motion.posture_grid import (
     START_COST,
     GridChain,
@@ -81,15 +82,15 @@ def _blocking_postures(
     layer: int,
 ) -> Failure:
     """Failure with the blocked postures at a layer, the nearest to being free first; if none is
-    blocked, with the smallest excess over the joint limits."""
+    blocked, with the smallest excess over the joint limits or the reason."""
     for grid, i in places:
         search.measure(grid, np.array([layer]), np.array([i]), grid.exists)
         blocked = grid.exists[layer, i] & ~grid.usable(layer, i)
         if blocked.any():
             break
     else:
-        excess = _limit_excess(search, X_AG, layer)
-        return Failure(outcome, excess=excess if 0.0 < excess < np.inf else np.nan)
+        layers = {layer, search.hand_path.segment_end(layer)}
+        return Failure.of_line(outcome, max(_limit_excess(search, X_AG, k) for k in layers))
     where = np.argwhere(blocked)
     order = np.argsort(-grid.upper[layer, i][blocked], kind="stable")[
         : ChainSearchSettings.max_explained
@@ -110,16 +111,37 @@ def _limit_failure(search: PostureGridBuilder, X_AG: Array) -> Failure:
 
 def _limit_excess(search: PostureGridBuilder, X_AG: Array, layer: int) -> float:
     """Smallest excess of a posture at a layer over the joint limits [rad]; infinite if the pose has
-    no posture even without limits."""
+    no posture even without limits.
+
+    The redundant joint is swept, then swept finely around its best values.
+    """
+    best_values, fine_values, rounds = 4, 9, 3
     ik = search.ik
-    half = np.full(len(ik.lower), np.pi)
-    centre = np.where(np.arange(len(half)) == 5, 0.5 * (ik.lower + ik.upper), 0.0)
-    unlimited = replace(ik, lower=centre - half, upper=centre + half)
-    count = search.settings.redundant[-1]
-    values = np.linspace(-np.pi, np.pi, count, endpoint=False)
-    q = unlimited.solve(search.hand_path.X_AH(X_AG, search.layers[layer]), values).q
-    beyond = np.maximum(ik.lower - q, q - ik.upper).max(axis=1)
-    return max(0.0, float(beyond.min(initial=np.inf)))
+    X_AH = search.hand_path.X_AH(X_AG, search.layers[layer])
+    step = 2.0 * np.pi / search.settings.redundant[-1]
+    values = np.arange(-np.pi, np.pi, step)
+    smallest = np.inf
+    for _ in range(rounds):
+        excess, q7 = _excess_by_value(ik, X_AH, values)
+        if not len(excess):
+            break
+        smallest = min(smallest, float(excess.min()))
+        best = np.unique(q7[np.argsort(excess, kind="stable")[:best_values]])
+        values = (best[:, None] + step * np.linspace(-1.0, 1.0, fine_values)).ravel()
+        step /= (fine_values - 1) / 2
+    return max(0.0, smallest)
+
+
+def _excess_by_value(ik: PandaIk, X_AH: Array, values: Array) -> tuple[Array, Array]:
+    """Excess over the joint limits (S,) [rad] of all postures at two hand poses (2, 4, 4), each
+    joint turned to within half a turn of the middle of its range; and their values (S,) of the
+    redundant joint [rad]."""
+    turn, middle = 2.0 * np.pi, 0.5 * (ik.lower + ik.upper)
+    unlimited = replace(ik, lower=np.full(len(middle), -turn), upper=np.full(len(middle), turn))
+    found = unlimited.solve(X_AH, values)
+    q = middle + (found.q - middle + np.pi) % turn - np.pi
+    excess = np.maximum(ik.lower - q, q - ik.upper).max(axis=1)
+    return excess, values[found.parameter]
 
 
 class ClosedFormLineSearch(PostureGridBuilder):

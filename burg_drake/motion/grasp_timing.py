@@ -14,6 +14,7 @@ from burg_drake.motion.numeric_ik import ArmKinematics
 from burg_drake.motion.plan_files import Plan
 from burg_drake.motion.polyline_timing import Cubics, IsFree, time_polyline
 from burg_drake.motion.reach_verdict import ArmPath
+from burg_drake.motion.target_sweep import MIN_STRAIGHTNESS
 from burg_drake.motion.trajectory import Motion, Trajectory
 from burg_drake.station import GraspMotion
 
@@ -65,12 +66,11 @@ def time_motion(
         InvalidInputError: a path outside the joint limits, or one that cannot be slowed down to
             keep the others.
     """
-    min_straightness = 2e-5  # Metres. The path itself is no straighter.
     unmeasured_clearance = 2e-4  # Metres. Clearance of a path without a measured one.
     settings, checks = settings or TimingSettings(), checks or PathChecks()
     near = unmeasured_clearance if np.isnan(path.clearance) else max(0.0, path.clearance)
     line_settings = replace(
-        settings, straightness=max(min_straightness, min(settings.straightness, near / 2.0))
+        settings, straightness=max(MIN_STRAIGHTNESS, min(settings.straightness, near / 2.0))
     )
     gentle = limits.scaled_down(settings.velocity_share, settings.ramp)
     transfer = time_polyline(

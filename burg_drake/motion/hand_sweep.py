@@ -220,18 +220,22 @@ class SweepResult:
             axis (see `geometry.swept_shape`). Else minus the overlap depth with the blocker.
         at: (N,) distance from the grasp at which the hand overlaps by this depth [m]; NaN where the
             path is free, or the overlap too short to be found.
+        room: (N,) how much deeper the held target may still get into bodies that it touches or
+            overlaps at the start [m]; infinite without any.
     """
 
     free: NDArray[np.bool_]
     blocker: NDArray[np.object_]
     clearance: Array
     at: Array
+    room: Array
 
     def __len__(self) -> int:
         return len(self.free)
 
     def add_blockers(self, rows: NDArray[np.intp], target: PathBlockers) -> None:
-        """Enters what blocks the target on the paths `rows` (S,)."""
+        """Enters what blocks the target on the paths `rows` (S,), and its room."""
+        self.room[rows] = target.room
         hit = np.flatnonzero(target.by != "")
         rows = rows[hit]
         self.free[rows], self.blocker[rows] = False, target.by[hit]
@@ -297,7 +301,7 @@ class HandSweep:
             self._open, X_WG[hit], names[hit], back_W, self._motion.standoff
         )
         clearance[hit] = -depth
-        return SweepResult(names == "", names, clearance, at)
+        return SweepResult(names == "", names, clearance, at, np.full(len(X_WG), np.inf))
 
     def retreat(self, instance: str, X_WG: Array, width: Array) -> SweepResult:
         """Checks the hand with the target straight back along the approach.
@@ -384,7 +388,7 @@ class HandSweep:
                 self._part_screens[k], X[hit], names[hit], u_W[hit], length
             )
             clearance[hit] = -depth
-        return SweepResult(names == "", names, clearance, at)
+        return SweepResult(names == "", names, clearance, at, np.full(len(X_WG), np.inf))
 
     def _checked(self, instance: str, X_WG: Array) -> Array:
         if instance and instance not in self._instances:

@@ -71,6 +71,11 @@ class HandPath:
             return Outcome.APPROACH_LINE
         return Outcome.RETREAT_LINE if layer <= self.at_retreated else Outcome.LIFT_LINE
 
+    def segment_end(self, layer: int) -> int:
+        """Index of the last layer of the segment that leads to a layer."""
+        ends = self.at_grasp, self.at_retreated, len(self.layers) - 1
+        return next(end for end in ends if layer <= end)
+
     def X_AH(self, X_AG: Array, distance: Array) -> Array:
         """Poses of the hand body.
 

@@ -11,7 +11,7 @@ arm is nearly singular. The numeric search follows few postures, but moves any j
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -57,12 +57,30 @@ class Failure:
             or m]; NaN if that is not the reason.
         q: (K, n) colliding configurations, the nearest to being free first.
         moved_W: (K, 3) displacement of the target at these configurations [m].
+        reason: in words, where neither a joint limit nor a collision is the reason; or "".
     """
 
     outcome: Outcome
     excess: float = np.nan
     q: Array = field(default_factory=lambda: np.empty((0, 0)))
     moved_W: Array = field(default_factory=lambda: np.empty((0, 3)))
+    reason: str = ""
+
+    @classmethod
+    def of_line(cls, outcome: Outcome, excess: float) -> Failure:
+        """A segment that the arm cannot follow although nothing is in its way.
+
+        Args:
+            outcome: `APPROACH_LINE`, `RETREAT_LINE` or `LIFT_LINE`.
+            excess: smallest excess of a configuration at the first and the last pose that no chain
+                reaches [rad or m], the larger one; infinite if one has none even without limits.
+        """
+        if 0.0 < excess < np.inf:
+            return cls(outcome, excess=excess)
+        name = outcome.value.removesuffix("_line")
+        if excess == np.inf:
+            return cls(outcome, reason=f"part of the {name} is out of the arm's reach")
+        return cls(outcome, reason=f"no joint motion connects the arm's postures on the {name}")
 
 
 class LineSearchBatch(Protocol):
@@ -107,8 +125,8 @@ class LineSearch(Protocol):
         Args:
             X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with both finger assignments. Their
                 order does not depend on how a grasp was given.
-            clearance: (N, 2) clearance of the hand on its path [m]; the hand may deviate from the
-                straight segment by a fraction of it.
+            clearance: (N, 2) room of the hand on its path [m], see `GraspBatch.room`; the hand may
+                deviate from the straight segment by a fraction of it.
         """
         ...
 
@@ -188,7 +206,11 @@ class _SuccessiveBatch:
             return first
         batch, index = self._second_batches[grasp]
         second = batch.failure(index)
-        return max(first, second, key=_failure_rank)
+        farther = max(first, second, key=_failure_rank)
+        if first.outcome != second.outcome or not (len(first.q) and len(second.q)):
+            return farther
+        q, moved_W = np.concatenate([first.q, second.q]), [first.moved_W, second.moved_W]
+        return replace(farther, q=q, moved_W=np.concatenate(moved_W))
 
     def _switch_search(self, grasps: Sequence[int]) -> None:
         """Hands grasps over to the second search if it may succeed."""

@@ -37,12 +37,15 @@ class GraspBatch:
         X_WG: (N, 2, 4, 4) grasps in the world with both finger assignments.
         width: (N,) distance between the pads that hold the target [m]; NaN if it is not known.
         clearance: (N, 2) clearance of the hand on its path [m]; negative where it is not free.
+        room: (N, 2) the smaller of that clearance and the depth that the held target may still get
+            into bodies that it touches or overlaps at the start [m].
     """
 
     instance: Sequence[str]
     X_WG: Array
     width: Array
     clearance: Array
+    room: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,10 +165,7 @@ class MotionSearch:
         """Excludes a chain. If the colliding link is rigid with the hand, no other posture helps,
         and the whole finger assignment is excluded."""
         self._refused[grasp] += 1
-        carried, moved_W, width = self._load(grasp, chain.moved_W[row])
-        overlaps = self._collision.overlaps(
-            chain.q[row], carried=carried, moved_W=moved_W, width=width
-        )
+        overlaps = self._overlaps_near(grasp, chain, row)
         with_hand = next((overlap for overlap in overlaps if overlap.carried), None)
         if with_hand is not None:
             self._search.close(grasp, chain.flip)
@@ -178,6 +178,19 @@ class MotionSearch:
         refusal = Refusal(outcome, with_hand or next(iter(overlaps), None))
         if grasp not in self._nearest or refusal.rank > self._nearest[grasp].rank:
             self._nearest[grasp] = refusal
+
+    def _overlaps_near(self, grasp: int, chain: Chain, row: int) -> list[Overlap]:
+        """Overlaps at a row of a chain, the deepest first; if there are none, between it and the
+        row before."""
+        before = max(row - 1, 0)
+        for share in (0.0, 0.5, 0.25, 0.75):
+            q = chain.q[row] + share * (chain.q[before] - chain.q[row])
+            moved = chain.moved_W[row] + share * (chain.moved_W[before] - chain.moved_W[row])
+            carried, moved_W, width = self._load(grasp, moved)
+            found = self._collision.overlaps(q, carried=carried, moved_W=moved_W, width=width)
+            if found:
+                return found
+        return []
 
     def _join_to_home(self, chains: dict[int, Chain]) -> dict[int, Reach]:
         """Verdicts on the free chains that a path joins to home; refuses the others."""
@@ -198,7 +211,7 @@ class MotionSearch:
                 approach=chain.q[: grasp_row + 1],
                 retreat=chain.q[grasp_row : lift_row + 1] if lift_row > grasp_row else None,
                 lift=chain.q[lift_row:],
-                clearance=hand,
+                clearance=float(self._grasps.room[grasp, chain.flip]),
             )
             clearance = max(0.0, min(hand, float(chain.lower.min())))
             found[grasp] = Reach(None, clearance=clearance, path=path)
@@ -209,11 +222,19 @@ class MotionSearch:
         if self._unconnected[grasp]:
             return Reach(Outcome.NO_PATH)
         failure, refusal = self._search.failure(grasp), self._nearest.get(grasp)
-        if refusal is not None and refusal.rank[0] >= _progress_rank(failure.outcome):
+        rank = _progress_rank(failure.outcome)
+        if refusal is not None and refusal.rank[0] > rank:
             return _reach_blocked_by(refusal.outcome, refusal.overlap)
         smallest = self._smallest_overlap(grasp, failure)
+        if refusal is not None and refusal.rank[0] == rank:
+            smallest = min(
+                (overlap for overlap in (smallest, refusal.overlap) if overlap is not None),
+                key=lambda overlap: overlap.depth,
+                default=None,
+            )
+            return _reach_blocked_by(refusal.outcome, smallest)
         if smallest is None:
-            return Reach(failure.outcome, excess=failure.excess)
+            return Reach(failure.outcome, excess=failure.excess, reason=failure.reason)
         return _reach_blocked_by(failure.outcome, smallest)
 
     def _smallest_overlap(self, grasp: int, failure: Failure) -> Overlap | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from burg_drake.core import InvalidInputError
+from burg_drake.motion.target_sweep import MIN_STRAIGHTNESS
 from burg_drake.station import GraspMotion
 
 
@@ -44,7 +45,7 @@ class ReachSettings:
     tolerance: float = 1e-6
     limit_margin: float = 0.01
     joint_travel: float = 0.8
-    deviation: tuple[float, float] = (2e-5, 5e-4)
+    deviation: tuple[float, float] = (MIN_STRAIGHTNESS, 5e-4)
     chains: int = 24
     starts_tried: int = 4
 

@@ -326,7 +326,7 @@ class _NumericBatch:
         if stage == APPROACH:
             return self._explain_no_approach(grasp)
         if stage in (RETREAT, LIFT):
-            return self._explain(dict(SEGMENT_STAGES)[stage], candidates, stage)
+            return self._explain_line(grasp, stage)
         return Failure(Outcome.NO_PATH)
 
     def _advance(self, grasps: list[int]) -> None:
@@ -363,6 +363,7 @@ class _NumericBatch:
             if stage == COMPLETE_CHAIN:
                 self._candidates[g].complete(j, found.q[s], self._cost(found.q[s], found.lower[s]))
             elif blocked is None:
+                self._candidates[g].q[j] = found.q[s]
                 self._candidates[g].stop(j, stage)
             else:
                 moved_W = search.hand_path.target_displacement(
@@ -434,27 +435,54 @@ class _NumericBatch:
             if not (upper > 0.0).any():
                 order = np.argsort(-upper, kind="stable")[: ChainSearchSettings.max_explained]
                 return Failure(Outcome.ARM_COLLISION, q=q[order], moved_W=np.zeros((len(order), 3)))
-        return self._explain(Outcome.APPROACH_LINE, self._candidates[grasp], APPROACH)
+        return self._explain_line(grasp, APPROACH)
 
     def _explain(self, outcome: Outcome, candidates: ChainCandidates, stage: int) -> Failure:
         """Failure with the colliding postures at a stage, the nearest to being free first."""
         q, moved_W = candidates.blocking(stage, ChainSearchSettings.max_explained)
         return Failure(outcome, q=q, moved_W=moved_W)
 
+    def _explain_line(self, grasp: int, stage: int) -> Failure:
+        """Failure on a segment: the colliding postures there; without any, the excess over the
+        joint limits at the ends of what no candidate reaches, or the reason."""
+        outcome, candidates = dict(SEGMENT_STAGES)[stage], self._candidates[grasp]
+        found = self._explain(outcome, candidates, stage)
+        if len(found.q):
+            return found
+        path, at_grasp = self._search.hand_path, self._search.at_grasp
+        followed = candidates.q[candidates.stage == stage]
+        absent = np.flatnonzero(np.isnan(followed[..., 0]).all(axis=0))
+        if stage == APPROACH:
+            absent = absent[absent < at_grasp]
+        else:
+            absent = absent[absent > (at_grasp if stage == RETREAT else path.at_retreated)]
+            absent = absent[absent <= path.segment_end(int(absent[0]))] if len(absent) else absent
+        ends = {*absent[:1].tolist(), *absent[-1:].tolist()}
+        excesses = [self._limit_excess(grasp, layer) for layer in ends]
+        return Failure.of_line(outcome, max(excesses, default=0.0))
+
     def _limit_failure(self, grasp: int, layer: int) -> Failure:
         """`JOINT_LIMIT` with the smallest excess, or `NO_IK` if no posture exists without
         limits."""
+        excess = self._limit_excess(grasp, layer)
+        if excess == np.inf:
+            return Failure(Outcome.NO_IK)
+        return Failure(Outcome.JOINT_LIMIT, excess=excess)
+
+    def _limit_excess(self, grasp: int, layer: int) -> float:
+        """Smallest excess of a posture at a layer over the joint limits [rad or m]; 0 if one within
+        the limits is found, infinite if the pose has none even without limits."""
         search = self._search
         X_AH = search.hand_path.X_AH(self._X_AG[grasp], search.layers[layer])
+        if any(len(search.solutions.solve(X_AH, k)[1]) for k in range(search.solutions.rounds)):
+            return 0.0
         q = np.concatenate(
             [
                 search.unlimited_solutions.solve(X_AH, round_index)[1]
                 for round_index in range(search.unlimited_solutions.rounds)
             ]
         )
-        if not len(q):
-            return Failure(Outcome.NO_IK)
         arm, margin = search.arm, search.settings.limit_margin
         q = arm.wrapped_near(q, 0.5 * (arm.lower + arm.upper))
         beyond = np.maximum(arm.lower + margin - q, q - arm.upper + margin).max(axis=1)
-        return Failure(Outcome.JOINT_LIMIT, excess=max(0.0, float(beyond.min())))
+        return max(0.0, float(beyond.min(initial=np.inf)))

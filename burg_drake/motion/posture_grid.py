@@ -333,14 +333,13 @@ class PostureGrid:
         Returns:
             The chains; None for grasps without one.
         """
-        preferred_clearance = 0.01  # Metres. Ten times the position error of a controlled arm.
         rows, steps = self._rows, self._steps
         if len(grasps) < self.q.shape[2]:
             chosen = np.flatnonzero(np.isin(rows.grasp, grasps))
             rows, steps = rows.select(chosen), steps.select(chosen)
         at = rows.index
         usable = self.joined[at] & ~self.refused[at] & (self.upper[at] > 0.0)
-        doubts = np.clip(1.0 - self.lower[at] / np.float32(preferred_clearance), 0.0, 1.0)
+        doubts = np.clip(1.0 - self.lower[at] / np.float32(PREFERRED_CLEARANCE), 0.0, 1.0)
         cost = np.where(usable, np.float32(doubt) * doubts, IMPOSSIBLE_STEP)
         values = steps.cost_to_end(cost)
         first = values[0] + self.start[at[1:]]
@@ -375,6 +374,9 @@ class PostureGrid:
         )
 
 
+PREFERRED_CLEARANCE = 0.01
+"""Metres, clearance that motions keep if they can: ten times the position error of a controlled
+arm."""
 START_COST = 0.3
 """Cost of a start per radian of the joint that is farthest from home."""
 

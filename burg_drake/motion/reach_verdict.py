@@ -24,8 +24,9 @@ class ArmPath:
         lift: (L, n) rows along the lift; a single one if the lift has no height.
         retreat: (J, n) rows from the grasp straight back along the approach, with the target;
             None if the lift begins at the grasp.
-        clearance: lower bound of the clearance of the hand and the held target on approach,
-            retreat and lift [m]; NaN if it is not known.
+        clearance: lower bound of the clearance of the hand on approach, retreat and lift; where
+            the held target touches or overlaps a body at the start, at most the depth that it may
+            still get into it [m]. NaN if it is not known.
     """
 
     X_WG: Array
@@ -49,9 +50,12 @@ class Reach:
             segments [m]; 0 if they are only known to be free. After a failure, clearance from the
             blocker, negative if it overlaps; NaN without a blocker.
         excess: how far the best configuration is beyond a joint limit, less
-            `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason.
+            `ReachSettings.limit_margin` [rad or m]; NaN if that is not the reason. If a segment
+            fails, the larger one of the first and the last pose that no motion reaches.
         path: the motion; None after a failure.
         lift: length of the lift [m]; NaN after a failure.
+        reason: why the arm cannot follow a segment, where neither an obstacle nor a joint limit is
+            the reason; or "".
     """
 
     outcome: Outcome | None
@@ -60,6 +64,7 @@ class Reach:
     excess: float = np.nan
     path: ArmPath | None = None
     lift: float = np.nan
+    reason: str = ""
 
     @property
     def q_grasp(self) -> Array | None:

@@ -31,7 +31,13 @@ BOARD_NAME = "board"
 """Name of the board, where no other object is below."""
 
 IssueKind = Literal[
-    "out_of_bounds", "in_ground", "sunken", "hovering", "overlap", "surface_overlap"
+    "out_of_bounds",
+    "in_ground",
+    "sunken",
+    "hovering",
+    "overlap",
+    "obstacle_overlap",
+    "surface_overlap",
 ]
 
 
@@ -41,7 +47,8 @@ class SceneIssue:
 
     Attributes:
         instance: name of the instance.
-        kind: kind of the issue. `hovering`, `sunken` (in the table, which carries it there) and
+        kind: kind of the issue. `hovering`, `sunken` (in the table, which carries it there),
+            `obstacle_overlap` (as deep in an obstacle as an object that leans on it may be) and
             `surface_overlap` (only the surfaces overlap, not the contact geometry) are warnings,
             all other kinds are errors.
         amount: distance beyond, below or above something, or penetration depth [m].
@@ -59,7 +66,8 @@ class SceneIssue:
     @property
     def is_error(self) -> bool:
         """Whether grasps would be evaluated in a world that differs from the document's."""
-        return self.kind not in ("hovering", "sunken", "surface_overlap")
+        warnings = ("hovering", "sunken", "obstacle_overlap", "surface_overlap")
+        return self.kind not in warnings
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,8 +98,8 @@ class _XmlElement:
 
 
 def require_valid_numbers(path: Path) -> None:
-    """Rejects a model with an invalid mass, inertia, limit, contact parameter, size or pose.
-    Invalid XML is left to Drake's parser.
+    """Rejects a model with an invalid mass, inertia, limit, contact parameter, size or pose, or
+    with a collision mesh in a format that cannot be used. Invalid XML is left to Drake's parser.
 
     Args:
         path: SDF or URDF file.
@@ -129,6 +129,8 @@ def _check_numbers(text: bytes, path: Path) -> None:
             for key, value in element.values():
                 if key in rules:
                     _require_rule(key, value, rules[key])
+            if element.name == "mesh" and any(e.name == "collision" for e in outer):
+                _require_collision_mesh(element)
             if element.name == "axis":
                 _require_axis_direction(element.figures())
             if element.name == "limit":
@@ -203,6 +205,18 @@ def _require_rule(key: str, text: str, rule: str) -> None:
             raise ValueError(f"{key} is {quote_value(text)}; it must be {rule}") from None
         if not NUMBER_RULES[rule][0](value):
             raise ValueError(f"{key} is {text}; it must be {rule}")
+
+
+def _require_collision_mesh(mesh: _XmlElement) -> None:
+    """Requires a mesh format whose convex hull Drake can make."""
+    uri = next((child.text.strip() for child in mesh.children if child.name == "uri"), "")
+    file = mesh.attributes.get("filename", uri)
+    suffix = Path(file).suffix
+    if suffix and suffix.lower() not in (".obj", ".gltf", ".vtk"):
+        raise ValueError(
+            f"{quote_value(file)} cannot be used for collisions; convert the {suffix} mesh to .obj"
+            " or .gltf, for example with Blender, and name the new file"
+        )
 
 
 def _require_axis_direction(axis: dict[str, str]) -> None:

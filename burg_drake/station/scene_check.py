@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -194,10 +195,7 @@ class SceneCheck:
         for a, b, depth in overlapping:
             if b == "table" and any(i.instance == a and i.kind == "in_ground" for i in issues):
                 continue
-            message = _overlap_issue(a, b, depth, self._parts, self._station.path)
-            issues.append(
-                SceneIssue(instance=a, kind="overlap", amount=depth, message=message, other=b)
-            )
+            issues.append(self._overlap_issue(a, b, depth))
         return tuple(issues)
 
     def travel(
@@ -253,8 +251,7 @@ class SceneCheck:
         among, fixed = self._world.overlaps()
         rank = {name: i for i, name in enumerate(self._world.bodies)}
         of_fixed = {name: len(rank) + i for i, name in enumerate(self._world.fixed)}
-        limits = dict.fromkeys(self._station.document.background, OBSTACLE_TOLERANCE)
-        limits["table"] = GROUND_TOLERANCE
+        limits = {"table": GROUND_TOLERANCE}
         for name in {name for name, other in fixed if other == "table"}:
             sunk = -self._placed[name].support  # Drake's depths are off by up to a millimetre
             fixed[name, "table"] = min(fixed[name, "table"], sunk)
@@ -267,6 +264,16 @@ class SceneCheck:
             and a in scene.instances
             and not (b == "table" and self._may_touch_table(a, depth, scene))
         ]
+
+    def _overlap_issue(self, a: str, b: str, depth: float) -> SceneIssue:
+        """The issue of an instance `a` that overlaps `b` by a depth [m]: a warning if it may lean
+        on an obstacle of the station."""
+        if b in self._station.document.background and depth <= OBSTACLE_TOLERANCE:
+            message = f"{a!r} is {length_text(depth)} deep in {b!r}; move it, unless it leans there"
+            kind: Literal["overlap", "obstacle_overlap"] = "obstacle_overlap"
+        else:
+            message, kind = _overlap_text(a, b, depth, self._parts, self._station.path), "overlap"
+        return SceneIssue(instance=a, kind=kind, amount=depth, message=message, other=b)
 
     def _may_touch_table(self, name: str, depth: float, scene: Scene) -> bool:
         """Whether an instance's contact geometry may be at a depth in the table [m]: its surface
@@ -399,7 +406,7 @@ def _describe_robot_parts(station_diagram: StationDiagram) -> dict[str, tuple[st
     }
 
 
-def _overlap_issue(
+def _overlap_text(
     a: str, b: str, depth: float, parts: dict[str, tuple[str, str]], path: Path
 ) -> str:
     """The message for two bodies that overlap; `a` is an instance."""

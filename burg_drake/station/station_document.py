@@ -143,6 +143,18 @@ def require_image_size(width: int, height: int) -> None:
         )
 
 
+@dataclass(frozen=True)
+class _PandaMount(Pose):
+    """How Franka's hand sits on `panda_link8`. It differs from the same pose given by a user, so
+    that the mount of another flange is written to files."""
+
+    rpy_deg: Vector3 | None = (0.0, 0.0, -45.0)
+
+
+PANDA_FLANGE = "panda_link8"
+"""Flange of a Panda, the only one for which `Arm.X_FH` may be left out."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Arm:
     """An arm and its base.
@@ -152,7 +164,8 @@ class Arm:
             station's file.
         base: link that is fixed in the world; its frame is A.
         flange: link or frame that carries the hand; its frame is F.
-        X_FH: pose of the hand's body in the flange frame.
+        X_FH: pose of the hand's body in the flange frame. May be left out only for a Panda's
+            `panda_link8`, on which the hand is turned by -45 degrees.
         X_WA: pose of the arm's base in the world.
         home: joint positions of the home posture [rad].
         velocity: velocity limit of each joint [rad/s], in place of the model's.
@@ -165,8 +178,8 @@ class Arm:
 
     model: str = "package://burg_drake/models/panda/panda_arm.sdf"
     base: str = "panda_link0"
-    flange: str = "panda_link8"
-    X_FH: Pose = Pose(rpy_deg=(0.0, 0.0, -45.0))
+    flange: str = PANDA_FLANGE
+    X_FH: Pose = _PandaMount()
     X_WA: Pose = Pose()
     home: tuple[float, ...]
     velocity: tuple[float, ...] | None = None
@@ -180,6 +193,13 @@ class Arm:
         for name in ("velocity", "acceleration", "jerk"):
             if min(getattr(self, name) or (1.0,)) < min_limit:
                 raise FieldError(f"arm {name} limits must be {min_limit:g} or more", name)
+        if isinstance(self.X_FH, _PandaMount) and self.flange != PANDA_FLANGE:
+            raise FieldError(
+                f"X_FH is missing, and only a Panda's {PANDA_FLANGE!r} has a usual one; give the"
+                f" pose of the hand's body in the frame of {self.flange!r}: X_FH: {{}} if the two"
+                " frames coincide, X_FH: {rpy_deg: [0, 0, 45]} for a hand turned by 45 degrees",
+                "flange",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.apps import Parser, add_motion_options, main, motion_from_options
+from burg_drake.apps import (
+    Parser,
+    add_motion_options,
+    describe_motion_remedy,
+    main,
+    motion_from_options,
+)
+from burg_drake.evaluation import motion_remedy
 from burg_drake.station import GraspMotion, load_station
 
 
@@ -51,3 +58,37 @@ def test_what_no_hand_can_do_is_one_line(words: str, message: str, capsys) -> No
     error = capsys.readouterr().err
     assert code == 2
     assert message in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "motion", "text", "option"),
+    [
+        (
+            ["lift_line", "hand_collision_lift", "reachable", "collision_table", "collision_table"],
+            GraspMotion(retreat=0.1),
+            "2 of 3 grasps fail on the lift of 300 mm; one as high as there is room, at least"
+            " 20 mm, may help",
+            "--least-lift-mm 20 asks for the shorter lift",
+        ),
+        (
+            ["retreat_line", "hand_collision_retreat", "no_ik"],
+            GraspMotion(retreat=0.1),
+            "2 of 3 grasps fail on the retreat of 100 mm; one of 50 mm may help",
+            "--retreat-mm 50 asks for the shorter retreat",
+        ),
+    ],
+)
+def test_a_lift_or_retreat_that_fails_most_grasps_names_the_option(
+    outcomes: list[str], motion: GraspMotion, text: str, option: str
+) -> None:
+    """The library says what fails; only commands name options."""
+    remedy = motion_remedy(outcomes, motion)
+    assert remedy is not None and remedy.text == text
+    assert describe_motion_remedy(remedy) == option
+
+
+def test_a_lift_that_is_short_already_or_fails_few_needs_no_remedy() -> None:
+    failing = ["hand_collision_lift"] * 3
+    assert motion_remedy(failing, GraspMotion(least_lift=0.02)) is None
+    assert motion_remedy([*failing, *["reachable"] * 3], GraspMotion()) is None
+    assert motion_remedy([], GraspMotion()) is None

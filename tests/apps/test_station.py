@@ -104,7 +104,7 @@ def test_check_with_a_scene(tmp_path: Path, capsys: Capture) -> None:
             " shoulder, and the arm reaches 0.95 m at most; change X_WS or arm.X_WA",
         ),
         (
-            (("  X_WA:", "  flange: panda_link9\n  X_WA:"),),
+            (("  X_WA:", "  flange: panda_link9\n  X_FH: {}\n  X_WA:"),),
             "arm.flange: ",
         ),
         (

@@ -120,10 +120,34 @@ def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_postu
         assert 0.0 < failures[k].excess < excess[k] + 0.07  # the redundant joint has a grid
 
 
+@pytest.mark.parametrize("joint", [3, 5])
+def test_the_excess_counts_whole_turns_of_every_joint(
+    search: ClosedFormLineSearch, joint: int
+) -> None:
+    """Joints 4 and 6 have ranges that are not symmetric: just beyond a limit they may be half a
+    turn away from 0."""
+    still = replace(search.hand_path, standoff=0.0, lift=0.0)
+    rest = search.proximity, search.home, search.settings
+    ends = ClosedFormLineSearch(search.arm, search.ik, still, *rest)
+    rng = np.random.default_rng(7)
+    q = rng.uniform(search.ik.lower, search.ik.upper, (60, 7))
+    excess = rng.uniform(0.02, 0.1, 60)
+    q[:, joint] = search.ik.lower[joint] - excess
+    X_AG = panda_forward(q) @ search.ik.X_FH @ STATION.hand.X_HG.matrix()
+    batch = begin(ends, *X_AG)
+    batch.propose(range(60))
+    failures = [batch.failure(k) for k in range(60)]
+    beyond = [k for k in range(60) if failures[k].outcome is Outcome.JOINT_LIMIT]
+    assert len(beyond) >= 2
+    assert all(0.0 < failures[k].excess < excess[k] + 1e-3 for k in beyond)
+
+
 def test_where_the_lift_leads_out_of_reach_the_line_fails(search: ClosedFormLineSearch) -> None:
     batch = begin(search, HIGH)
     assert batch.propose([0]) == [None]
-    assert batch.failure(0).outcome is Outcome.LIFT_LINE
+    failure = batch.failure(0)
+    assert failure.outcome is Outcome.LIFT_LINE and np.isnan(failure.excess)
+    assert failure.reason == "part of the lift is out of the arm's reach"
 
 
 def test_a_chain_does_not_depend_on_the_batch(search: ClosedFormLineSearch) -> None:

@@ -54,7 +54,9 @@ def place_on_gantry(q: Array) -> Array:
 def test_the_block_rises_to_the_bar(tmp_path: Path, room: float) -> None:
     motion = GraspMotion(standoff=0.01, least_lift=0.02)
     found = gantry(tmp_path, motion, bar=in_front(HIGH + room)).check("", X_WG)
-    assert found.outcome is None and found.lift == pytest.approx(np.floor(100 * room) / 100)
+    reserve = 0.01  # below the bar, if the least lift allows
+    assert found.outcome is None
+    assert found.lift == pytest.approx(max(np.floor(100 * room) / 100 - reserve, 0.02))
     assert found.blocker == "z_link vs bar" and found.path is not None
     rise = np.diff(place_on_gantry(found.path.lift)[[0, -1]], axis=0)
     np.testing.assert_allclose(rise, [[0.0, 0.0, found.lift]], atol=1e-6)

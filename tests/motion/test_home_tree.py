@@ -165,6 +165,19 @@ def test_over_a_wall(tmp_path: Path) -> None:
         assert path[:, 2].max() > 0.65 and audit(edges, path, np.ones(3))
 
 
+def test_a_joint_makes_no_detour_that_is_not_needed(tmp_path: Path) -> None:
+    """Over the wall the gantry has to rise; it need not go to the side and back."""
+    edges = gantry_edges(tmp_path, wall=box((0.5, -0.6, 0.0), (0.52, 0.6, 0.55)))
+    tree = HomeTree(edges, HOME, LOWER, UPPER, nodes=0)
+    ends = HOME, (HOME[0] + 0.6, 0.0, HOME[2])
+    over = [(HOME[0] + 0.1, 0.49, 0.7), (HOME[0] + 0.5, 0.49, 0.7)]
+    path = np.array([ends[0], *over, ends[1]])
+    assert edges.first_blocked(path) is None
+    short = tree.shortcut(path)
+    assert edges.first_blocked(short) is None and length(short) < length(path)
+    assert np.abs(short[:, 1]).max() < 0.25 and np.ptp(short[:, 2]) > 0.2
+
+
 def test_out_of_a_narrow_shaft(tmp_path: Path) -> None:
     """A well, 30 cm wide along the closing direction and 14 cm across, that no node lies in."""
     inner, outer = ((0.63, -0.15), (0.77, 0.15)), ((0.6, -0.18), (0.8, 0.18))

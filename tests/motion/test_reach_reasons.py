@@ -14,8 +14,8 @@ import pytest
 from gantry import UPPER, box, gantry_diagram
 
 import burg_drake as burg
-from burg_drake.core import Outcome, Pose, grasp_from_axes
-from burg_drake.motion import ArmReach, Reach, ReachSettings
+from burg_drake.core import Array, Outcome, Pose, grasp_from_axes
+from burg_drake.motion import ArmReach, Failure, Reach, ReachSettings, SuccessiveLineSearch
 from burg_drake.scene import Scene, load_scene
 from burg_drake.station import Obstacle, load_station
 
@@ -101,7 +101,9 @@ def test_a_joint_limit_is_told_with_what_is_missing(alone: ArmReach) -> None:
 
 
 def test_a_limit_on_the_way_up_fails_the_lift_line(alone: ArmReach) -> None:
-    assert at(alone, z=UPPER[2] - TCP - 0.2).outcome is Outcome.LIFT_LINE
+    found = at(alone, z=UPPER[2] - TCP - 0.2)
+    assert found.outcome is Outcome.LIFT_LINE and not found.blocker and not found.reason
+    assert found.excess == pytest.approx(0.1 + ReachSettings().limit_margin, abs=1e-6)
 
 
 def test_a_gantry_does_not_tilt(alone: ArmReach) -> None:
@@ -170,3 +172,35 @@ def test_earlier_names_still_work() -> None:
         assert burg.arm.Witness is burg.arm.ArmPath
     with pytest.warns(DeprecationWarning, match="Reach.path since 0.1"):
         assert burg.Reach(None).witness is None
+
+
+class Failing:
+    """A search that finds nothing, and knows two arm positions in collision."""
+
+    def __init__(self, first: float) -> None:
+        self.q = np.array([[first], [first + 1.0]])
+
+    def lifted(self, height: float) -> Failing:
+        return self
+
+    def begin(self, X_AG: Array, clearance: Array) -> Failing:
+        return self
+
+    def propose(self, grasps: list[int]) -> list[None]:
+        return [None] * len(grasps)
+
+    def refuse(self, grasp: int, chain: object, row: int | None) -> None: ...
+
+    def close(self, grasp: int, flip: int) -> None: ...
+
+    def failure(self, grasp: int) -> Failure:
+        return Failure(Outcome.LIFT_LINE, q=self.q, moved_W=np.zeros((2, 3)))
+
+
+def test_the_attempts_of_both_searches_are_told() -> None:
+    """So that the one that came closest can be named."""
+    search = SuccessiveLineSearch(Failing(0.0), lambda: Failing(5.0))
+    batch = search.begin(np.zeros((1, 2, 4, 4)), np.zeros((1, 2)))
+    assert batch.propose([0]) == [None]
+    assert batch.failure(0).q[:, 0].tolist() == [0.0, 1.0, 5.0, 6.0]
+    assert len(batch.failure(0).moved_W) == 4

@@ -113,10 +113,16 @@ def test_what_leans_on_a_box_of_the_station_may_sink_into_it_as_into_the_table(
     library: Path, panda: Station, tmp_path: Path
 ) -> None:
     scene = scene_of(library, tmp_path, (0.215, 0.2, HEIGHT))
-    for depth, fine in ((2.4e-3, True), (2.6e-3, False)):
+    said = {
+        0.9e-3: [],
+        2.4e-3: ["'cube_0' is 2.4 mm deep in 'wall'; move it, unless it leans there"],
+        2.6e-3: ["'cube_0' and 'wall' overlap by 2.6 mm; move them apart"],
+    }
+    for depth, messages in said.items():
         wall = Obstacle(X_WB=Pose((0.255 - depth, 0.2, 0.1)), size=(0.02, 0.3, 0.2))
         issues = check_scene(scene, bare_station(panda, background={"wall": wall}))
-        assert (issues == ()) is fine, issues
+        assert [issue.message for issue in issues] == messages
+        assert [issue.is_error for issue in issues] == [depth > 2.5e-3] * len(messages)
 
 
 def test_buried_is_said_once(library: Path, panda: Station, tmp_path: Path) -> None:

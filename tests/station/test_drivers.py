@@ -300,7 +300,8 @@ def test_an_arm_with_actuators_in_another_order(empty: Scene, tmp_path: Path) ->
     model = tmp_path / "arm.urdf"
     model.write_text(f'<robot name="arm">{"".join(parts)}</robot>')
     station = load_station("panda_tabletop")
-    arm = Arm(base="base", flange="fore", home=(0.0, 0.0), X_WA=Pose((0.0, 0.0, 0.5)))
+    X_WA = Pose((0.0, 0.0, 0.5))
+    arm = Arm(base="base", flange="fore", X_FH=Pose(), home=(0.0, 0.0), X_WA=X_WA)
     document = replace(station.document, arm=arm)
     with pytest.raises(
         InvalidInputError,

@@ -67,3 +67,55 @@ def test_errors_name_the_file(tmp_path: Path) -> None:
         add_models(parser, lacking)
     with pytest.raises(InvalidInputError, match=r"none\.sdf: No such file"):
         add_models(parser, tmp_path / "none.sdf")
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "found", "target"),
+    [
+        ("arm.urdf.xacro", '<xacro:arm arm_id="fr3"/>', "xacro:arm", "arm.urdf"),
+        ("arm.urdf", '<link name="$(arg prefix)base"/>', "$(arg prefix)", "arm_expanded.urdf"),
+        ("arm.urdf", "<link name='${prefix}base'/>", "${prefix}", "arm_expanded.urdf"),
+    ],
+)
+def test_xacro_has_to_be_expanded(
+    tmp_path: Path, name: str, body: str, found: str, target: str
+) -> None:
+    path = tmp_path / name
+    path.write_text(f'<robot name="arm">\n<!-- made with $(arg x) -->\n{body}</robot>')
+    with pytest.raises(InvalidInputError) as refused:
+        add_models(RobotDiagramBuilder(time_step=1e-3).parser(), path)
+    assert str(refused.value) == (
+        f"{path}:3: '{found}' is xacro, not URDF; expand the file first, and name the new one:"
+        f" xacro {name} > {target}"
+    )
+
+
+def test_expanded_files_may_tell_where_they_are_from(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        '<robot name="arm" xmlns:xacro="http://ros.org/wiki/xacro"><!-- ${prefix} <xacro:x/> -->'
+        '<link name="base"/><gazebo><plugin name="p">$(find arm)/x.yaml</plugin></gazebo></robot>'
+    )
+    assert add_models(RobotDiagramBuilder(time_step=1e-3).parser(), path)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("m.urdf", '<robot name="m"><link name="base"><collision name="hull"><geometry>'
+         '<mesh filename="meshes/link0.dae"/></geometry></collision></link></robot>'),
+        ("m.sdf", '<sdf version="1.9"><model name="m"><link name="base"><collision name="hull">'
+         "<geometry><mesh><uri>meshes/link0.dae</uri></mesh></geometry></collision></link>"
+         "</model></sdf>"),
+    ],
+)  # fmt: skip
+def test_collision_meshes_that_drake_does_not_read(tmp_path: Path, name: str, text: str) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InvalidInputError) as refused:
+        add_models(RobotDiagramBuilder(time_step=1e-3).parser(), path)
+    assert str(refused.value) == (
+        f"{path}:1: link 'base', collision 'hull': 'meshes/link0.dae' cannot be used for"
+        " collisions; convert the .dae mesh to .obj or .gltf, for example with Blender, and name"
+        " the new file"
+    )

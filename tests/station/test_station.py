@@ -18,10 +18,13 @@ from burg_drake.core import (
     UnknownNameError,
     builtin_names,
     inverse,
+    load_document,
+    plain_data,
     resolve_reference,
+    save_document,
 )
 from burg_drake.scene import Board
-from burg_drake.station import Camera, Station, load_station
+from burg_drake.station import Arm, Camera, Station, StationDocument, load_station
 
 A2 = np.array([[0, 0, 0], [0.594, 0, 0], [0.594, 0.42, 0], [0, 0.42, 0]])
 """Corners of the sheet in the scene frame [m]."""
@@ -212,6 +215,23 @@ def test_every_number_of_a_program_has_to_be_finite(tmp_path: Path, number: floa
         assert str(refused.value) == f"{key} is {number}; it must be a finite number"
     with pytest.raises(FieldError, match=rf"^size\[1\] is {number}; .*finite"):
         Board(size=(0.5, number))
+
+
+def test_the_mount_of_another_arms_hand_has_to_be_given(tmp_path: Path) -> None:
+    """The Panda's -45 degrees would turn every grasp of another arm, without a word."""
+    path = station_file(tmp_path, ("  X_WA:", "  flange: fr3_link8\n  X_WA:"))
+    with pytest.raises(DocumentError) as refused:
+        load_station(path)
+    assert str(refused.value).startswith(f"{path}:5: arm: X_FH is missing, and only a Panda's ")
+    assert "in the frame of 'fr3_link8': X_FH: {} if the two frames coincide" in str(refused.value)
+
+
+def test_a_given_mount_is_kept_in_files_even_if_it_is_that_of_the_panda(tmp_path: Path) -> None:
+    same = Arm(home=(0.0,), flange="tool0", X_FH=Pose(rpy_deg=(0.0, 0.0, -45.0)))
+    document = replace(load_station("panda_tabletop").document, arm=same)
+    save_document(document, tmp_path / "own.yaml")
+    assert load_document(tmp_path / "own.yaml", StationDocument) == document
+    assert "X_FH" not in plain_data(load_station("panda_tabletop").document.arm)
 
 
 def test_a_base_beside_the_table_may_be_lower(tmp_path: Path) -> None:

@@ -397,6 +397,8 @@ def _evaluate(
 def _print_run(run: evaluation.Run, motion: GraspMotion, *, rejudged: bool) -> None:
     """Prints the tables of a run, the paths of its files, and failures."""
     print_summary(run)
+    if remedy := evaluation.remedy_of_run(run):
+        print_note_lines([options.describe_motion_remedy(remedy)])
     if run.document.shard:
         print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
     _print_motion(motion)

@@ -227,6 +227,9 @@ def _print_results(
     names = [scene.instance(n).object for n in evaluation.chosen_instances(scene, arguments.only)]
     given = arguments.grasps is not None
     print_reach_tables(judged.select(_judged_mask(judged)), names, motion, given=given)
+    outcomes = judged.select(_judged_mask(judged)).column("outcome")
+    if remedy := evaluation.motion_remedy(outcomes.tolist(), motion):
+        print_note_lines([remedy.text, options.describe_motion_remedy(remedy)])
     if given and (note := evaluation.missing_grasps_note(names, judged.object.tolist())):
         print(f"note: {note}")
     if motion != GraspMotion():

@@ -28,6 +28,7 @@ from .evaluated_grasps import (
     add_grasp_file_options as add_grasp_file_options,
     add_motion_options as add_motion_options,
     add_sampling_options as add_sampling_options,
+    describe_motion_remedy as describe_motion_remedy,
     grasps_per_object as grasps_per_object,
     motion_fields_from_options as motion_fields_from_options,
     motion_from_options as motion_from_options,

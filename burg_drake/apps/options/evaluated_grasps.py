@@ -19,6 +19,7 @@ from burg_drake.apps.options.settings_options import add_settings_options, field
 from burg_drake.apps.options.values import input_file, renaming
 
 if TYPE_CHECKING:
+    from burg_drake.evaluation import MotionRemedy
     from burg_drake.scene import Scene
     from burg_drake.station import GraspMotion, Station
 
@@ -161,6 +162,12 @@ def motion_fields_from_options(arguments: argparse.Namespace) -> dict[str, objec
     from burg_drake.station import GraspMotion
 
     return fields_from_options(arguments, GraspMotion)
+
+
+def describe_motion_remedy(remedy: MotionRemedy) -> str:
+    """The option that a remedy suggests, with its value, in one sentence."""
+    what = "retreat" if remedy.setting == "retreat" else "lift"
+    return f"{motion_option(remedy.setting)} {1e3 * remedy.value:g} asks for the shorter {what}"
 
 
 def motion_from_options(arguments: argparse.Namespace, station: Station) -> GraspMotion:
