@@ -26,8 +26,8 @@ INNER_DEPTH = 0.95
 """Depth of the inner point behind the front, over the thickness."""
 NEAR, FAR = 0.3, 0.5
 """Where eight points around the middle of the front lie, on its axes and, in both directions, on
-its diagonals, from the middle (0) to the edges (1). Over patches that cover parts of the front, strips and pieces that an edge cuts off, they
-carry the most torsional friction that so many triangles can."""
+its diagonals, from the middle (0) to the edges (1). Over strips, and patches that an edge cuts off,
+they carry the most torsional friction that so many triangles can."""
 
 
 def pad_vtk(size: Sequence[float], thickness: int = 1, front: np.ndarray | None = None) -> str:
