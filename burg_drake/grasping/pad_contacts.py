@@ -98,7 +98,7 @@ def jaws_of(hand: Hand, path: Path, packages: Packages = NO_PACKAGES) -> Jaws:
         force=hand.force,
         y=(y_low, y_high),
         z=(z_low, z_high),
-        foundation=figures.pad_modulus / (0.5 * min(figures.pad_size)),
+        foundation=figures.pad_stiffness,
     )
 
 

@@ -21,6 +21,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
+from scipy.spatial import ConvexHull
 
 from burg_drake.core import (
     NO_PACKAGES,
@@ -210,12 +211,12 @@ class HandFigures:
         opening: smallest and largest distance between the pads [m].
         pad_bounds: smallest and largest coordinates of the first pad in the grasp frame G [m];
             those along x depend on how far the hand is open.
-        pad_modulus: hydroelastic modulus of the first pad [Pa].
+        pad_stiffness: pressure of the first pad over the depth behind its front [N/m^3].
     """
 
     opening: tuple[float, float]
     pad_bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
-    pad_modulus: float
+    pad_stiffness: float
 
     @property
     def pad_size(self) -> tuple[float, float, float]:
@@ -262,7 +263,7 @@ def _check_document(
     bench.check_coupling()
     (x0, y0, z0), (x1, y1, z1) = bench.bounds(0).tolist()
     bounds = (x0, y0, z0), (x1, y1, z1)
-    return HandFigures((smallest, largest), bounds, bench.pad_modulus())
+    return HandFigures((smallest, largest), bounds, bench.pad_stiffness())
 
 
 class _HandBench:
@@ -396,19 +397,42 @@ class _HandBench:
     def bounds(self, index: int) -> Array:
         """Smallest and largest coordinates (2, 3) of a finger's pad in G [m], at its current
         position."""
+        p_GV = self._corners(self._X_GB(index), self._model.pads[index])
+        return np.stack([p_GV.min(axis=0), p_GV.max(axis=0)])
+
+    def _X_GB(self, index: int) -> Array:
+        """Pose (4, 4) of a finger in G, at its current position."""
         X_HB = self._plant.CalcRelativeTransform(
             self._plant_context,
             self._model.body.body_frame(),
             self._model.fingers[index].body_frame(),
         )
-        X_GB = inverse(self._hand.X_HG.matrix()) @ X_HB.GetAsMatrix4()
-        p_GV = self._corners(X_GB, self._model.pads[index])
-        return np.stack([p_GV.min(axis=0), p_GV.max(axis=0)])
+        X_GB: Array = inverse(self._hand.X_HG.matrix()) @ X_HB.GetAsMatrix4()
+        return X_GB
 
-    def pad_modulus(self) -> float:
-        """Hydroelastic modulus of the first pad [Pa]."""
-        properties = self._inspector.GetProximityProperties(self._model.pads[0])
-        return float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
+    def pad_stiffness(self) -> float:
+        """Pressure of the first pad over the depth behind its front [N/m^3].
+
+        The pressure grows up to the hydroelastic modulus at the vertex of the pad's volume mesh
+        that is farthest inside; without such a mesh, at half of the pad's thickness.
+        """
+        pad, (low, high) = self._model.pads[0], self.bounds(0)
+        properties = self._inspector.GetProximityProperties(pad)
+        modulus = float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
+        depth, mesh = (
+            0.5 * float((high - low).min()),
+            self._inspector.maybe_get_hydroelastic_mesh(pad),
+        )
+        if isinstance(mesh, VolumeMesh):
+            X_GB = self._X_GB(0)
+            X_BC = self._inspector.GetPoseInFrame(pad).GetAsMatrix4()
+            vertices = np.array([mesh.vertex(k) for k in range(mesh.num_vertices())])
+            planes = ConvexHull(vertices).equations
+            inside = -(vertices @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+            deepest = vertices[inside > 0.999 * inside.max()]
+            # The first finger closes towards -x of G.
+            depth = float((transform_points(X_GB @ X_BC, deepest)[:, 0] - low[0]).min())
+        return modulus / depth
 
     def _corners(self, X_GB: Array, geometry: GeometryId) -> Array:
         """Corners (N, 3) of a geometry of body B in G [m]; of a round one, corners of its bounding

@@ -150,7 +150,7 @@ def test_errors_of_an_object_do_not_stop_the_others_and_those_of_the_machine_do(
         cube, heavy = label()
         assert "50 grasps in a row" in cube.error and cube.run is None
         assert heavy.path is not None and not heavy.error
-    shutil.rmtree(tmp_path / "runs")  # The first error meets a new object.
+    shutil.rmtree(tmp_path)  # The first error meets a new object.
     for kind in (DeviceError, ClusterError, MissingDependencyError):
         fail_with(kind("it is lost"))
         with pytest.raises(kind, match="it is lost"):

@@ -129,7 +129,7 @@ def test_a_bar_that_is_pushed_at_one_end(pushed_bar: HandTrial) -> None:
 
 def test_a_neighbour_that_falls_over_is_named(make_scene: Callable[..., Scene]) -> None:
     """A post stands at the edge of the box, and falls when that is lifted."""
-    on_top = Instance(object="post", X_SO=Pose((0.3, 0.235, BOX[2])))
+    on_top = Instance(object="post", X_SO=Pose((0.3, 0.243, BOX[2])))
     scene = make_scene(("box", 0.3, 0.2, 0.0), on_top, ("block", 0.1, 0.35, 0.0))
     trial = HandTrial(scene, make_station(), engine=QUICK)
     result = trial.run("box", from_above(0.05, y=-0.03), friction=0.8)
