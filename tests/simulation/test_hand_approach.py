@@ -44,12 +44,12 @@ def box(make_scene: Callable[..., Scene]) -> HandTrial:
 
 def assert_alike(one: TrialResult, other: TrialResult) -> None:
     assert one.outcome is other.outcome
-    for name, tolerance in (("slip", 3e-4), ("tilt", 3e-3), ("lift", 5e-4), ("pad_force", 0.05)):
+    for name, tolerance in (("slip", 2e-4), ("tilt", 3e-3), ("lift", 5e-4), ("pad_force", 0.05)):
         first, second = getattr(one.margins, name), getattr(other.margins, name)
         assert first == pytest.approx(second, abs=tolerance), name
 
 
-@pytest.mark.parametrize("friction", [0.11, thorough(0.15), 0.5])
+@pytest.mark.parametrize("friction", [0.15, 0.5])
 def test_a_clear_approach_makes_no_difference(
     box: HandTrial, box_trial: HandTrial, friction: float
 ) -> None:
