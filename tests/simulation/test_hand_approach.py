@@ -14,7 +14,6 @@ from burg_drake.evaluation import trial_verdict
 from burg_drake.scene import Scene
 from burg_drake.simulation import Execution, HandTrial, TrialResult, TrialSettings
 from burg_drake.station import GraspMotion, Obstacle, Station
-from tests.thorough import thorough
 
 APPROACH = TrialSettings(approach=True)
 GRASPS = [from_above(0.05, y=y, yaw=yaw) for y, yaw in ((0.0, 0.0), (0.03, 0.0), (-0.02, 0.3))]
