@@ -15,17 +15,13 @@ import numpy as np
 from .arrays import Array, pose, rotation
 from .blocks import blocks
 from .lathe import arc, bent, hexagonal, lathe, line, polyline, stretched
-from .solid import MassProperties, Solid, mass_properties
+from .solid import FALLEN, LYING, UPRIGHT, MassProperties, Solid, mass_properties
 from .strangers import STRANGERS
 
 SPACING = 5e-4
 """Of samples that pads may touch [m]."""
 FEET = 1.5e-3
 """Of samples that the table may touch [m]."""
-
-UPRIGHT = np.eye(3)
-LYING = rotation((1.0, 0.0, 0.0), np.pi / 2)
-FALLEN = rotation((0.0, 1.0, 0.0), np.pi / 2)
 
 TUNED = ("box", "bar", "can", "ball", "dumbbell", "bowl", "mug", "u", "torus")
 HELD_OUT = (

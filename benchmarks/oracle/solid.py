@@ -7,7 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, rotation
+
+UPRIGHT = np.eye(3)
+LYING = rotation((1.0, 0.0, 0.0), np.pi / 2)
+FALLEN = rotation((0.0, 1.0, 0.0), np.pi / 2)
+"""Orientations (3, 3) in which solids rest on a plane."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,13 +14,10 @@ import numpy as np
 from .arrays import Array, rotation
 from .blocks import Box, blocks
 from .lathe import Curve, arc, bent, lathe, line, polyline, stretched
-from .solid import Solid
+from .solid import FALLEN, LYING, UPRIGHT, Solid
 
 Make = Callable[[float], Solid]
 
-UPRIGHT = np.eye(3)
-LYING = rotation((1.0, 0.0, 0.0), np.pi / 2)
-FALLEN = rotation((0.0, 1.0, 0.0), np.pi / 2)
 STANDING = rotation((1.0, 0.0, 0.0), -np.pi / 2)
 EGG_AT_REST = rotation((1.0, 0.0, 0.0), np.pi / 2 + 0.15)
 """Where the centre of mass of an egg is lowest: its blunt end is heavier."""

@@ -24,7 +24,7 @@ from scipy.spatial import Delaunay
 PAD_FILE = "pad.vtk"
 INNER_DEPTH = 0.95
 """Depth of the inner point behind the front, over the thickness."""
-NEAR, FAR = 0.3, 0.5
+RING_ON_AXES, RING_ON_DIAGONALS = 0.3, 0.5
 """Where eight points around the middle of the front lie, on its axes and, in both directions, on
 its diagonals, from the middle (0) to the edges (1). Over strips, and patches that an edge cuts off,
 they carry the most torsional friction that so many triangles can."""
@@ -61,9 +61,9 @@ def squares(n: int) -> np.ndarray:
 def ring() -> np.ndarray:
     """A front of eight points around its middle, within the corners and middles of its edges."""
     outline = [point for point in squares(2) if point.any()]
-    axes = [(NEAR, 0), (-NEAR, 0), (0, NEAR), (0, -NEAR)]
-    diagonals = [(FAR, FAR), (-FAR, FAR), (-FAR, -FAR), (FAR, -FAR)]
-    return np.array([*outline, *axes, *diagonals])
+    signs = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    axes = RING_ON_AXES * np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])
+    return np.concatenate([outline, axes, RING_ON_DIAGONALS * signs])
 
 
 def _cells(front: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
