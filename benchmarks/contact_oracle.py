@@ -120,7 +120,7 @@ def main() -> None:
     with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
         journal.complete(pool, runs, chunked, execute)
         judged = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
-        open_cases = [c for c in cases if any(differs(c, e, judged) for e in engines)]
+        open_cases = [c for c in cases if any(differs(c, e, judged) for e in (*engines, *finer))]
         hinges = [Run(case, label, library) for label in HINGES for case in open_cases]
         journal.complete(pool, hinges, chunked, execute)
     rows = {(run.case.id, run.label): journal.rows[run.key] for run in (*runs, *hinges)}
