@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull, QhullError
 from burg_drake.core import Array, InvalidInputError, transform_points
 from burg_drake.scene import convex_polygon, polygon_area
 from burg_drake.station.hand_document import Finger, Hand
+from burg_drake.station.hand_model import front_stiffness
 from burg_drake.station.station_diagram import FloatingHand, StationDiagram
 from burg_drake.station.visible_triangles import hull_vertices
 
@@ -43,10 +44,7 @@ class PadFront:
 def find_pad_front(
     X_BC: Array, volume: VolumeMesh, modulus: float, closing_B: Array, side_B: Array
 ) -> PadFront:
-    """Finds the front of a pad, and its stiffness.
-
-    The pressure of Drake's elastic volumes grows from 0 at the surface to the modulus at the vertex
-    farthest inside; behind a front it grows evenly up to the first vertices inside.
+    """Finds the front of a pad, and its stiffness, see `front_stiffness`.
 
     Args:
         X_BC: (4, 4) pose of the volume in the link.
@@ -89,20 +87,13 @@ def find_pad_front(
     )
     X_BP[:3, 2] = closing_B
     X_BP[:3, 3] = middle[0] * side_B + middle[1] * other_B + heights.max() * closing_B
-    planes = hull.equations
-    inside = -(p_BV @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-    within = inside > flat_tolerance
-    if not within.any():
-        raise ValueError("has no inner vertex of the pad's volume mesh behind it")
-    depth = heights.max() - heights
-    first = np.flatnonzero(within)[np.argmin(depth[within])]
     corners = p_BV[hull.vertices]
     return PadFront(
         X_BP=X_BP,
         size=(float(high[0] - low[0]), float(high[1] - low[1])),
         area=float(area),
-        stiffness=float(modulus * inside[first] / inside.max() / depth[first]),
-        thickness=float(depth.max()),
+        stiffness=front_stiffness(p_BV, closing_B, modulus),
+        thickness=float(heights.max() - heights.min()),
         corners=np.asarray((corners - X_BP[:3, 3]) @ X_BP[:3, :3]),
     )
 

@@ -266,6 +266,32 @@ def _check_document(
     return HandFigures((smallest, largest), bounds, bench.pad_stiffness())
 
 
+def front_stiffness(vertices: Array, closing: Array, modulus: float) -> float:
+    """Pressure over the depth behind the front of a pad [N/m^3].
+
+    The pressure of Drake's elastic volumes grows from 0 at the surface to the modulus at the vertex
+    farthest inside; behind a front it grows evenly up to the first vertices inside.
+
+    Args:
+        vertices: (N, 3) vertices of the pad's volume mesh [m].
+        closing: (3,) unit vector in which the finger closes.
+        modulus: hydroelastic modulus [Pa].
+
+    Raises:
+        ValueError: the mesh has no inner vertex.
+    """
+    surface_tolerance = 1e-5  # Metres.
+    planes = ConvexHull(vertices).equations
+    inside = -(vertices @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+    within = inside > surface_tolerance
+    if not within.any():
+        raise ValueError("has no inner vertex of the pad's volume mesh behind it")
+    heights = vertices @ closing
+    depth = heights.max() - heights
+    first = np.flatnonzero(within)[np.argmin(depth[within])]
+    return float(modulus * inside[first] / inside.max() / depth[first])
+
+
 class _HandBench:
     """Test plant with the hand alone, its body fixed, without gravity."""
 
@@ -413,26 +439,18 @@ class _HandBench:
     def pad_stiffness(self) -> float:
         """Pressure of the first pad over the depth behind its front [N/m^3].
 
-        The pressure grows up to the hydroelastic modulus at the vertex of the pad's volume mesh
-        that is farthest inside; without such a mesh, at half of the pad's thickness.
+        Without a volume mesh, the pressure counts as the modulus at half of the pad's thickness.
         """
         pad, (low, high) = self._model.pads[0], self.bounds(0)
         properties = self._inspector.GetProximityProperties(pad)
         modulus = float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
-        depth, mesh = (
-            0.5 * float((high - low).min()),
-            self._inspector.maybe_get_hydroelastic_mesh(pad),
-        )
-        if isinstance(mesh, VolumeMesh):
-            X_GB = self._X_GB(0)
-            X_BC = self._inspector.GetPoseInFrame(pad).GetAsMatrix4()
-            vertices = np.array([mesh.vertex(k) for k in range(mesh.num_vertices())])
-            planes = ConvexHull(vertices).equations
-            inside = -(vertices @ planes[:, :3].T + planes[:, 3]).max(axis=1)
-            deepest = vertices[inside > 0.999 * inside.max()]
-            # The first finger closes towards -x of G.
-            depth = float((transform_points(X_GB @ X_BC, deepest)[:, 0] - low[0]).min())
-        return modulus / depth
+        mesh = self._inspector.maybe_get_hydroelastic_mesh(pad)
+        if not isinstance(mesh, VolumeMesh):
+            return modulus / (0.5 * float((high - low).min()))
+        X_GC = self._X_GB(0) @ self._inspector.GetPoseInFrame(pad).GetAsMatrix4()
+        vertices = np.array([mesh.vertex(k) for k in range(mesh.num_vertices())])
+        # The first finger closes towards -x of G.
+        return front_stiffness(transform_points(X_GC, vertices), np.array([-1.0, 0, 0]), modulus)
 
     def _corners(self, X_GB: Array, geometry: GeometryId) -> Array:
         """Corners (N, 3) of a geometry of body B in G [m]; of a round one, corners of its bounding
