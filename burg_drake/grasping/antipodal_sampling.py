@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -352,18 +353,33 @@ def _collect_grasps(
 
     effort = SamplingEffort
 
-    def worth_testing() -> bool:
+    def tests_left() -> int:
         further = min(effort.tests_per_accepted * kept, effort.tests_per_wanted * n)
-        return kept < n and tried < effort.min_tests + further
+        return effort.min_tests + further - tried
+
+    def worth_testing() -> bool:
+        return kept < n and tests_left() > 0
+
+    def blocks_to_test() -> int:
+        """As many as likely hold the missing grasps, as one test of many grasps is quicker."""
+        size, chunk = ContactPairSettings.rays_per_block, ContactPairSettings.lines_per_chunk
+        if not kept:
+            return 1
+        missing, affordable = (n - kept) / kept, tests_left() / tried
+        return max(1, min(int(min(missing, affordable) * rays), chunk) // size)
 
     while worth_testing() and rays < effort.min_rays + effort.rays_per_grasp * tried:
-        for pairs in draw_pairs(surface, rng, settings.friction, settings.opening):
-            block = _grasps_on(pairs, settings, rng)
-            tried += len(block.X_OG)
-            parts.append(block if accept is None else _select_accepted(block, accept))
-            kept += len(parts[-1].X_OG)
-            rays += ContactPairSettings.rays_per_block
-            left_out += pairs.left_out + block.left_out
+        stream = draw_pairs(surface, rng, settings.friction, settings.opening)
+        while group := list(islice(stream, blocks_to_test())):
+            blocks = [_grasps_on(pairs, settings, rng) for pairs in group]
+            for pairs, block, passed in zip(group, blocks, _accepted(blocks, accept), strict=True):
+                tried += len(block.X_OG)
+                parts.append(passed)
+                kept += len(passed.X_OG)
+                rays += ContactPairSettings.rays_per_block
+                left_out += pairs.left_out + block.left_out
+                if not worth_testing():
+                    break
             if not worth_testing():
                 break
     columns = zip(*((part.X_OG, part.width, part.score) for part in parts), strict=True)
@@ -393,11 +409,19 @@ def _grasps_on(
     return _GraspBatch(X_OG, width[pair], score[pair], left_out=left_out)
 
 
-def _select_accepted(grasps: _GraspBatch, accept: Accept) -> _GraspBatch:
-    passed = np.asarray(accept(grasps.X_OG), dtype=bool)
-    if passed.shape != (len(grasps.X_OG),):
+def _accepted(blocks: Sequence[_GraspBatch], accept: Accept | None) -> list[_GraspBatch]:
+    """The accepted grasps of each block."""
+    if accept is None:
+        return list(blocks)
+    X_OG = np.concatenate([block.X_OG for block in blocks])
+    passed = np.asarray(accept(X_OG), dtype=bool)
+    if passed.shape != (len(X_OG),):
         raise InvalidInputError(
-            f"accept returned an array of shape {passed.shape} for {len(grasps.X_OG)}"
+            f"accept returned an array of shape {passed.shape} for {len(X_OG)}"
             " grasps; it must return one true/false value a grasp"
         )
-    return _GraspBatch(grasps.X_OG[passed], grasps.width[passed], grasps.score[passed])
+    masks = np.split(passed, np.cumsum([len(block.X_OG) for block in blocks])[:-1])
+    return [
+        _GraspBatch(block.X_OG[mask], block.width[mask], block.score[mask])
+        for block, mask in zip(blocks, masks, strict=True)
+    ]

@@ -146,6 +146,13 @@ class HandClearance:
         blocker, _ = self._screen.deepest(check_pose(X_WG, "X_WG"), list(self._screen.bodies))
         return np.asarray(blocker == "")
 
+    def blockers(self, instance: str, X_WG: Array, mode: ClearanceMode) -> NDArray[np.str_]:
+        """(N,) `blocker` of `measure` without a margin; faster, as no clearance is measured."""
+        blocker, _ = self._screen.deepest(
+            X_WG, list(self.outcomes(instance)), faces_only=mode == "conservative"
+        )
+        return blocker.astype(np.str_)
+
     def outcomes(self, instance: str) -> dict[str, Outcome]:
         """Outcome of an overlap with each body for grasps of `instance`, by priority."""
         # The first of these outcomes is reported.

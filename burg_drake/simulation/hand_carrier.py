@@ -109,7 +109,7 @@ class HandLiftClearance(_LiftClearance):
         self._other_boxes = self._boxes(self._others)
         self._index = station_diagram.free[instance]
         target = self._plant.get_body(self._index)
-        self._swept: SweptBoxes | None = None
+        self._swept = self._swept_boxes()
         start = target.floating_positions_start() + 4
         self._translations = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
@@ -127,9 +127,9 @@ class HandLiftClearance(_LiftClearance):
         self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
         _copy_state(self._diagram, self._plant_context, world)
         positions = self._plant.GetPositions(self._plant_context)
-        if not self._boxes_meet(length * direction_W):
-            return True
-        for travelled in np.append(np.arange(spacing, length, spacing), length):
+        first, last = self._near_others(length * direction_W)
+        travels = np.append(np.arange(spacing, length, spacing), length)
+        for travelled in travels[(travels >= first * length) & (travels <= last * length)]:
             moved = positions.copy()
             moved[self._translations] += travelled * np.append(direction_W, 1.0)
             self._plant.SetPositions(self._plant_context, moved)
@@ -148,8 +148,6 @@ class HandLiftClearance(_LiftClearance):
             X_WO: (N, 4, 4) target in the world.
             p_W: (N, 3) rest of the path [m].
         """
-        if self._swept is None:
-            self._swept = self._swept_boxes()
         return self._swept.are_apart(X_WG, X_WO, p_W, MIN_BOX_GAP)
 
     def _swept_boxes(self) -> SweptBoxes:
@@ -171,20 +169,30 @@ class HandLiftClearance(_LiftClearance):
         return SweptBoxes(
             BoxSet(X_GB, half),
             BoxSet(np.array(X_OB), np.array([size for _, (_, size) in of_target])),
-            *_box_bounds(query, self._other_boxes),
+            self._placed_boxes(self._other_boxes),
         )
 
-    def _boxes_meet(self, p_W: Array) -> bool:
-        """Whether the world-aligned bounding box of the moving geometries, swept along a
-        displacement (3,), overlaps the box of another geometry."""
+    def _placed_boxes(self, boxes: list[GeometryBox]) -> BoxSet:
+        """Boxes of geometries in the world."""
         query = self._query()
-        low, high = _box_bounds(query, self._carried_boxes)
-        low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
-        other_low, other_high = _box_bounds(query, self._other_boxes)
-        apart = (low[:, None] > other_high[None] + MIN_BOX_GAP) | (
-            other_low[None] > high[:, None] + MIN_BOX_GAP
+        poses = [query.GetPoseInWorld(g).GetAsMatrix4() @ X_PB for g, (X_PB, _) in boxes]
+        return BoxSet(np.array(poses), np.array([half for _, (_, half) in boxes]))
+
+    def _near_others(self, p_W: Array) -> tuple[float, float]:
+        """Part of a displacement (3,), from 0 to 1, outside which the world-aligned bounding boxes
+        of the moving geometries are apart from those of all others; (inf, -inf) if always."""
+        (low, high), (other_low, other_high) = (
+            (corners[0] for corners in self._placed_boxes(boxes).bounds(np.eye(4)[None]))
+            for boxes in (self._carried_boxes, self._other_boxes)
         )
-        return not apart.any(axis=2).all()
+        p_W = np.where(np.abs(p_W) < 1e-12, 1e-12, p_W)  # Divides by it; far below the gap.
+        enter = (other_low[None] - MIN_BOX_GAP - high[:, None]) / p_W
+        leave = (other_high[None] + MIN_BOX_GAP - low[:, None]) / p_W
+        first = np.minimum(enter, leave).max(axis=2).clip(min=0.0)
+        last = np.maximum(enter, leave).min(axis=2).clip(max=1.0)
+        near = first <= last
+        begin, end = first.min(where=near, initial=np.inf), last.max(where=near, initial=-np.inf)
+        return float(begin), float(end)
 
     def _boxes(self, geometries: list[GeometryId]) -> list[GeometryBox]:
         inspector = self._query().inspector()
@@ -249,14 +257,6 @@ def copy_object_poses(diagram: StationDiagram, plant_context: Context, world: Pl
         X_WO = diagram.X_WO(name) if moved is None else world.X_WB(moved)
         body = diagram.plant.get_body(index)
         diagram.plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, RigidTransform(X_WO))
-
-
-def _box_bounds(query: QueryObject, boxes: list[GeometryBox]) -> tuple[Array, Array]:
-    """Lower and upper corners (N, 3) of world-aligned bounding boxes of geometries."""
-    X_WB = np.array([query.GetPoseInWorld(g).GetAsMatrix4() @ X_GB for g, (X_GB, _) in boxes])
-    half = np.array([half for _, (_, half) in boxes])
-    reach = np.einsum("nij,nj->ni", np.abs(X_WB[:, :3, :3]), half)
-    return X_WB[:, :3, 3] - reach, X_WB[:, :3, 3] + reach
 
 
 class LiftPath(NamedTuple):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, inverse
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +22,13 @@ class BoxSet:
     X_FB: Array
     half: Array
 
-    def bounds(self, X_WF: Array) -> tuple[Array, Array]:
-        """Lower and upper corners (N, K, 3) of the world-aligned boxes around them, with their
-        frame at poses (N, 4, 4)."""
-        R_WF, p_WF = X_WF[:, None, :3, :3], X_WF[:, None, :3, 3]
-        center = np.einsum("nkij,kj->nki", R_WF, self.X_FB[:, :3, 3]) + p_WF
-        R_WB = np.einsum("nkij,kjl->nkil", R_WF, self.X_FB[:, :3, :3])
-        reach = np.einsum("nkij,kj->nki", np.abs(R_WB), self.half)
+    def bounds(self, X_AF: Array) -> tuple[Array, Array]:
+        """Lower and upper corners (N, K, 3) of boxes around them along the axes of a frame A, in
+        which their own frame has poses (N, 4, 4)."""
+        R_AF, p_AF = X_AF[:, None, :3, :3], X_AF[:, None, :3, 3]
+        center = np.einsum("nkij,kj->nki", R_AF, self.X_FB[:, :3, 3]) + p_AF
+        R_AB = np.einsum("nkij,kjl->nkil", R_AF, self.X_FB[:, :3, :3])
+        reach = np.einsum("nkij,kj->nki", np.abs(R_AB), self.half)
         return center - reach, center + reach
 
 
@@ -39,13 +39,12 @@ class SweptBoxes:
     Attributes:
         hand: in the grasp frame G.
         target: in the target's frame O.
-        low, high: (Q, 3) corners of the world-aligned boxes of all others [m].
+        others: in the world.
     """
 
     hand: BoxSet
     target: BoxSet
-    low: Array
-    high: Array
+    others: BoxSet
 
     def are_apart(self, X_WG: Array, X_WO: Array, p_W: Array, min_gap: float) -> NDArray[np.bool_]:
         """Whether nothing that moves comes near anything else.
@@ -53,7 +52,7 @@ class SweptBoxes:
         Args:
             X_WG, X_WO: (N, 4, 4) grasp frame and target in the world.
             p_W: (N, 3) paths [m].
-            min_gap: distance in each direction that counts as near [m].
+            min_gap: distance along an axis of world or hand that counts as near [m].
 
         Returns:
             (N,) values.
@@ -64,20 +63,40 @@ class SweptBoxes:
         return np.concatenate([np.zeros(0, dtype=bool), *found])
 
     def _are_apart(self, X_WG: Array, X_WO: Array, p_W: Array, min_gap: float) -> NDArray[np.bool_]:
-        bounds = self.hand.bounds(X_WG), self.target.bounds(X_WO)
-        low, high = (np.concatenate(both, axis=1) for both in zip(*bounds, strict=True))
-        low = low + np.minimum(p_W, 0.0)[:, None] - min_gap
-        high = high + np.maximum(p_W, 0.0)[:, None] + min_gap
+        others = self.others.bounds(np.eye(4)[None])
+        low, high = self._swept_bounds(X_WG, X_WO, p_W, min_gap)
         # Most paths are free already by one box around all that moves.
-        near = self._meet(low.min(axis=1)[:, None], high.max(axis=1)[:, None])
+        around = low.min(axis=1, keepdims=True), high.max(axis=1, keepdims=True)
+        near = _boxes_meet(around, others).any(axis=(1, 2))
         rows = np.flatnonzero(near)
-        near[rows] = self._meet(low[rows], high[rows])
+        pairs = _boxes_meet((low[rows], high[rows]), others)
+        left = pairs.any(axis=(1, 2))
+        near[rows], rows, pairs = left, rows[left], pairs[left]
+        # Of tilted hands the boxes along their own axes are smaller.
+        X_GW = inverse(X_WG[rows])
+        p_G = np.einsum("nij,nj->ni", X_GW[:, :3, :3], p_W[rows])
+        X_GG = np.tile(np.eye(4), (len(rows), 1, 1))
+        moving = self._swept_bounds(X_GG, X_GW @ X_WO[rows], p_G, min_gap)
+        near[rows] = (pairs & _boxes_meet(moving, self.others.bounds(X_GW))).any(axis=(1, 2))
         return ~near
 
-    def _meet(self, low: Array, high: Array) -> NDArray[np.bool_]:
-        """(N,) whether one of the boxes (N, K, 3) meets one of the others."""
-        meet = np.ones((*low.shape[:2], len(self.low)), dtype=bool)
-        for axis in range(3):
-            meet &= low[..., axis, None] <= self.high[:, axis]
-            meet &= high[..., axis, None] >= self.low[:, axis]
-        return np.asarray(meet.any(axis=(1, 2)))
+    def _swept_bounds(
+        self, X_AG: Array, X_AO: Array, p_A: Array, min_gap: float
+    ) -> tuple[Array, Array]:
+        """Lower and upper corners (N, K, 3), along the axes of a frame A, of boxes around all that
+        moves and a gap."""
+        bounds = self.hand.bounds(X_AG), self.target.bounds(X_AO)
+        low, high = (np.concatenate(both, axis=1) for both in zip(*bounds, strict=True))
+        low += np.minimum(p_A, 0.0)[:, None] - min_gap
+        high += np.maximum(p_A, 0.0)[:, None] + min_gap
+        return low, high
+
+
+def _boxes_meet(a: tuple[Array, Array], b: tuple[Array, Array]) -> NDArray[np.bool_]:
+    """(N, K, Q) whether boxes with corners (N, K, 3) meet boxes with corners (N, Q, 3)."""
+    (a_low, a_high), (b_low, b_high) = a, b
+    meet = np.ones((max(len(a_low), len(b_low)), a_low.shape[1], b_low.shape[1]), dtype=bool)
+    for axis in range(3):
+        meet &= a_low[:, :, None, axis] <= b_high[:, None, :, axis]
+        meet &= a_high[:, :, None, axis] >= b_low[:, None, :, axis]
+    return meet

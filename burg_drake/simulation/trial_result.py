@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import json
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-
-import numpy as np
 
 from burg_drake.core import Array, Margins as Margins, Outcome, TrialFindings
 from burg_drake.grasping import Clearance
@@ -108,9 +107,9 @@ class GripLoad:
             p_WCm: (3,) centre of mass in the world [m].
             friction, force, mass, acceleration: see the attributes.
         """
-        weight = np.array([0.0, 0.0, -1.0])
-        moment = np.cross(p_WCm - X_WG[:3, 3], weight) @ X_WG[:3, 0]
-        return cls(friction, force, mass, acceleration, abs(float(moment)))
+        x, y, _ = (p_WCm - X_WG[:3, 3]).tolist()
+        closing_x, closing_y, _ = X_WG[:3, 0].tolist()
+        return cls(friction, force, mass, acceleration, abs(closing_y * x - closing_x * y))
 
     @property
     def carried(self) -> float:
@@ -197,7 +196,13 @@ class Curve:
 
     def at(self, value: float) -> float:
         """The term for a value of the sign."""
-        return float(np.interp(value, self.knots, self.logits))
+        if value <= self.knots[0]:
+            return self.logits[0]
+        if value >= self.knots[-1]:
+            return self.logits[-1]
+        k = bisect_right(self.knots, value)
+        slope = (self.logits[k] - self.logits[k - 1]) / (self.knots[k] - self.knots[k - 1])
+        return slope * (value - self.knots[k - 1]) + self.logits[k - 1]
 
 
 Curves = Mapping[str, Curve]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,6 +50,7 @@ class StationDiagram:
     parts: ContactParts
     table: BodyIndex
     robot_bodies: tuple[BodyIndex, ...]
+    _X_WO: dict[str, Array] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def plant(self) -> MultibodyPlant:
@@ -79,7 +80,9 @@ class StationDiagram:
 
     def X_WO(self, instance: str) -> Array:
         """Pose (4, 4) of an instance in the document."""
-        return instance_pose(self.scene, self.station, instance)
+        if instance not in self._X_WO:
+            self._X_WO[instance] = instance_pose(self.scene, self.station, instance)
+        return self._X_WO[instance].copy()
 
 
 def instance_pose(scene: Scene, station: Station, instance: str) -> Array:

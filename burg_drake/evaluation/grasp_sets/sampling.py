@@ -138,9 +138,13 @@ class ClearanceFilter:
     def __call__(self, X_OG: Array) -> NDArray[np.bool_]:
         """(N,) whether to keep each of the grasps (N, 4, 4)."""
         X_WG = self._X_WO @ X_OG
-        found = self._screen.measure(self._name, X_WG, mode=self._mode, margin=self._margin)
-        passed = found.clear
-        self.blocked.update(found.blocker[~passed].tolist())
+        if self._margin > 0.0:
+            found = self._screen.measure(self._name, X_WG, mode=self._mode, margin=self._margin)
+            blocker = found.blocker
+        else:
+            blocker = self._screen.blockers(self._name, X_WG, self._mode)
+        passed = blocker == ""
+        self.blocked.update(blocker[~passed].tolist())
         clear = np.flatnonzero(passed)
         contacts = grasp_contacts(self._surface, X_OG[clear], self._jaws)
         passed[clear] = are_antipodal(contacts, X_OG[clear], self._friction)
