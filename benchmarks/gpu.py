@@ -1,6 +1,7 @@
 """Trials a second of engine mujoco-gpu, against the engines that execute grasps one by one.
 
     python benchmarks/gpu.py [OBJECT ...] [--grasps N] [--worlds W ...] [--device D] [--each M]
+                             [--run N] [--workers P]
 
 Every object stands in SCENE (tabletop_six). The grasps are clear ones, every second one with less
 friction; if there are fewer than asked for, they are repeated. For each number of worlds a row has
@@ -8,22 +9,31 @@ trials a second of the whole batch, from the grasps to their results, of which s
 on the CPU; grasps a second that one core feeds (screens, starts and results); and the most memory
 in use on the card meanwhile, by all processes. M of the grasps are executed one by one by engines
 of the CPU, and ratios are to one core. On a card the kernels that take most of the time follow. The
-first batch, a small one, compiles the kernels, and is not counted.
+first batch, a small one, compiles the kernels, and is not counted. `--grasps 0` leaves all of this
+out.
+
+At last `burg.evaluate` judges N grasps of the objects by P worker processes, from sampling to the
+report: grasps a second of the whole call, the share of time by phase (opening, sampling, judging,
+writing), and the largest memory of this process and of a worker. Judging includes the start of the
+workers and the screens. N is small on the CPU device, where it is a try; 0 leaves it out.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
+import tempfile
 import time
 from collections import defaultdict
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import warp as wp
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
-from burg_drake.core import Array
+from burg_drake.core import STARTING_PHASE, Array, Progress
 from burg_drake.scene import Scene
 from burg_drake.simulation import BatchTrial, hand_trial_of
 from burg_drake.station import Station
@@ -33,6 +43,8 @@ COMPILING = 8
 SAMPLED = 1000
 """Different grasps of an object, at most."""
 SHOWN_KERNELS = 8
+RUN_ON_THE_CPU, RUN_ON_A_CARD = 12, 100_000
+"""Grasps of the run through `evaluate`."""
 
 
 def main() -> None:
@@ -47,11 +59,31 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, nargs="+", default=[1024, 4096, 16384])
     parser.add_argument("--each", type=int, default=50, help="grasps executed one by one")
     parser.add_argument("--device")
+    parser.add_argument("--run", type=int, help="grasps that evaluate judges; 0 for none")
+    parser.add_argument("--workers", type=int, default=4, help="processes of evaluate")
     arguments = parser.parse_args()
     scene = burg.load_scene(arguments.scene)
     station = hand_only(burg.load_station(arguments.station))
     batch = BatchTrial(scene, station, device=arguments.device)
     print(f"{batch.device}, MuJoCo Warp {version('mujoco-warp')}, Warp {wp.__version__}")
+    if arguments.grasps:
+        measure_batches(batch, arguments)
+    count = RUN_ON_THE_CPU if arguments.device == "cpu" else RUN_ON_A_CARD
+    count = count if arguments.run is None else arguments.run
+    if count:
+        settings = burg.EvaluationSettings(
+            mode="hand",
+            engine="mujoco-gpu",
+            device=arguments.device,
+            only=arguments.objects,
+            grasps_per_object=-(-count // len(arguments.objects)),
+        )
+        measure_run(scene, arguments.station, settings, arguments.workers)
+
+
+def measure_batches(batch: BatchTrial, arguments: argparse.Namespace) -> None:
+    """Prints the rates of batches of each object."""
+    scene, station = batch.single.scene, batch.single.station
     for name in arguments.objects:
         X_OG = clear_grasps(batch.single, name, min(SAMPLED, arguments.grasps))
         friction = frictions(scene, name, len(X_OG))
@@ -113,6 +145,58 @@ def print_kernels(batch: BatchTrial, name: str, X_OG: Array, friction: Array) ->
     total = sum(by_kernel.values())
     for kernel, spent in sorted(by_kernel.items(), key=lambda item: -item[1])[:SHOWN_KERNELS]:
         print(f"  {100.0 * spent / total:5.1f} %  {kernel}")
+
+
+class PhaseTimes:
+    """Wall time by phase [s], from the events of `evaluate`.
+
+    Attributes:
+        times: the times by phase, in order.
+    """
+
+    def __init__(self) -> None:
+        self.times: dict[str, float] = {}
+        self._phase, self._begun = "opening", time.perf_counter()
+
+    def note(self, event: Progress) -> None:
+        """Notes an event; what comes after the last verdict is writing."""
+        phase = "judging" if event.phase == STARTING_PHASE else event.phase
+        self.begin("writing" if 0 < event.total == event.done else phase)
+
+    def begin(self, phase: str) -> None:
+        """Ends the present phase, and begins another."""
+        now = time.perf_counter()
+        self.times[self._phase] = self.times.get(self._phase, 0.0) + now - self._begun
+        self._phase, self._begun = phase, now
+
+
+def measure_run(
+    scene: Scene, station: str, settings: burg.EvaluationSettings, workers: int
+) -> None:
+    """Prints the rate of a whole call of `evaluate`, its phases and its memory."""
+    phases = PhaseTimes()
+    with tempfile.TemporaryDirectory() as folder:
+        run = burg.evaluate(
+            scene,
+            station,
+            Path(folder, "run"),
+            settings=settings,
+            workers=workers,
+            progress=phases.note,
+        )
+        phases.begin("")
+        judged, executed = len(run.candidates), run.document.stretches[-1].executed
+    total = sum(phases.times.values())
+    shares = (f"{name} {100.0 * spent / total:.0f} %" for name, spent in phases.times.items())
+    own, largest = (
+        resource.getrusage(who).ru_maxrss / 2**20
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    print(
+        f"evaluate, {workers} workers: {judged} grasps, {sum(executed.values())} of them executed,"
+        f" in {total:.1f} s: {judged / total:.1f} a second; {', '.join(shares)}; memory"
+        f" {own:.1f} GiB, of a worker at most {largest:.1f} GiB"
+    )
 
 
 if __name__ == "__main__":

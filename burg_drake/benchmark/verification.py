@@ -29,7 +29,14 @@ from burg_drake.core import (
     software_versions,
     worker_count,
 )
-from burg_drake.evaluation import comparison, differences, load_run, origin_of, rerun
+from burg_drake.evaluation import (
+    comparison,
+    differences,
+    load_run,
+    origin_of,
+    replay_engine,
+    rerun,
+)
 
 
 @dataclass(frozen=True)
@@ -154,9 +161,10 @@ def _judge_again(work: tuple[Path, str, float]) -> VerifiedGrasp:
     assert trial.verdict is not None
     origin = origin_of(run.document).judged_by(trial.verdict.judged_again)
     scene, station = run.scene(), run.station()
-    now, _ = rerun(scene, station, trial, origin)
+    engine = replay_engine(origin)
+    now, _ = rerun(scene, station, trial, origin, engine)
     found = differences(trial.verdict, now)
-    text = list(comparison(found, origin))
+    text = list(comparison(found, origin, engine))
     object = scene.instance(trial.instance).object
     grasp = GraspSet.create(trial.X_OG[None], object=object)
     (needed,) = with_friction_needed(grasp, scene, station).columns[FRICTION_COLUMN]

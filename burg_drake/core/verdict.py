@@ -292,6 +292,8 @@ CPU_TIME_COLUMNS: Mapping[Stage, tuple[str, str, Mode]] = {
 """Column, description and first mode of each stage's CPU time."""
 
 
+ONE_BY_ONE = "one by one on the CPU"
+"""`Verdict.device` of grasps that an engine with parallel trials executes on the CPU instead."""
 CONTESTED_CONFIDENCE = 0.9
 """An executed verdict with less confidence is contested."""
 
@@ -309,6 +311,9 @@ class Verdict(Findings):
         cpu: CPU time by stage [s].
         interrupted: whether it failed because its worker process was ended from outside, so that a
             retry may succeed.
+        device: devices of the process that executed the grasp by an engine with parallel trials,
+            or `ONE_BY_ONE`; empty for other engines, and if an earlier stage decided. Sessions
+            count it; journals and tables do not have it.
     """
 
     outcome: Outcome = field(
@@ -339,6 +344,7 @@ class Verdict(Findings):
         kw_only=True,
     )
     interrupted: bool = field(default=False, kw_only=True)
+    device: str = field(default="", compare=False, kw_only=True)
 
     @property
     def contested(self) -> bool:

@@ -173,6 +173,7 @@ from .judge import (
     mode_for as mode_for,
     require_engine_for as require_engine_for,
     screen_grasps as screen_grasps,
+    starting_note as starting_note,
     trial_verdict as trial_verdict,
 )
 from .labelling import (
@@ -197,6 +198,7 @@ from .part_store import (
     read_journal_counts as read_journal_counts,
 )
 from .replay import (
+    ReplayEngine as ReplayEngine,
     TrialInputs as TrialInputs,
     arm_figures as arm_figures,
     as_result as as_result,
@@ -206,6 +208,7 @@ from .replay import (
     find_inputs as find_inputs,
     judge_of_trial as judge_of_trial,
     motion_figures as motion_figures,
+    replay_engine as replay_engine,
     rerun as rerun,
 )
 from .report.failure_sections import (

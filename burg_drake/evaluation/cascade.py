@@ -8,6 +8,7 @@ folder continues where an earlier one stopped.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -235,12 +236,12 @@ def _judge_open_grasps(
     document = run.document
     save_run(run.with_document(add_session(document, session)))
     begun = time.monotonic()
-    judged = 0
+    judged: Counter[str] = Counter()
     try:
         with closing(executor.judge([job])) as verdicts:
             for _, candidate, verdict in verdicts:
                 journal.append(candidate.id, verdict)
-                judged += 1
+                judged[verdict.device] += 1
                 meter.step(outcome=verdict.outcome)
     finally:
         session = session.finish(judged, begun)

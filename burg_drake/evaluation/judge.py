@@ -18,6 +18,7 @@ import numpy as np
 
 from burg_drake.core import (
     MODES,
+    ONE_BY_ONE,
     Array,
     DeviceError,
     Findings,
@@ -147,10 +148,12 @@ class Decision(Findings):
     Attributes:
         outcome: final outcome of the grasp; None passes it on to the next stage.
         motion: the arm's motion, if later stages need it.
+        device: see `Verdict`.
     """
 
     outcome: Outcome | None = None
     motion: ArmPath | Plan | None = field(default=None, compare=False, repr=False, kw_only=True)
+    device: str = field(default="", compare=False, kw_only=True)
 
 
 class Screen(NamedTuple):
@@ -300,10 +303,10 @@ def _with_found_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Can
 def _make_verdict(
     decisions: Sequence[Decision], stage: Stage, cpu: Mapping[Stage, float]
 ) -> Verdict:
-    last = decisions[-1].outcome
+    last, device = decisions[-1].outcome, decisions[-1].device
     assert last is not None
     decided = stage if last is Outcome.SIMULATION_FAILED else last.stage
-    return Verdict(last, decided, cpu=cpu, **merge_findings(decisions))
+    return Verdict(last, decided, cpu=cpu, device=device, **merge_findings(decisions))
 
 
 def trial_decision(result: TrialResult) -> Decision:
@@ -561,18 +564,17 @@ class HandJudge(StationJudge):
                 progress=partial(report_progress, Stage.EXECUTED),
             )
             for k, grasp, result in zip(rows, chosen, results, strict=True):
-                decisions[k] = self._decision(grasp, result)
+                device = ONE_BY_ONE if result.on_cpu else self._batch.device
+                decisions[k] = self._decision(grasp, result, device)
         return decisions
 
     def _lift_of(self, grasp: Candidate) -> float:
         return self._trial.motion.lift_height if grasp.lift is None else grasp.lift
 
-    def _decision(self, grasp: Candidate, result: TrialResult) -> Decision:
+    def _decision(self, grasp: Candidate, result: TrialResult, device: str = "") -> Decision:
         decision = trial_decision(result)
-        if not self._lifts:
-            return decision
-        lift = {MarginNames.lift_height: self._lift_of(grasp)}
-        return replace(decision, margins={**decision.margins, **lift})
+        lift = {MarginNames.lift_height: self._lift_of(grasp)} if self._lifts else {}
+        return replace(decision, margins={**decision.margins, **lift}, device=device)
 
 
 class ArmJudge(StationJudge):

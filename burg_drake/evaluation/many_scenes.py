@@ -275,7 +275,7 @@ def evaluate_scenes(
             save_campaign(campaign)
         call = _CampaignCall(campaign, scenes, request, executor, reporter)
         campaign = call.run()
-        if call.judged_count:
+        if call.judged:
             document = replace(campaign.document, hints=campaign_hints(campaign))
             campaign = save_campaign(replace(campaign, document=document))
         renew_report(campaign)
@@ -316,7 +316,7 @@ class _CampaignCall:
         self.judging: dict[str, SceneJudging] = {}
         # a shard of the grasps of each scene, not a shard of the scenes
         self.scene_request = replace(self.request, shard=self.campaign.document.shard_of_grasps)
-        self.judged_count = 0
+        self.judged: Counter[str] = Counter()  # By `Verdict.device`.
         asked = self.request.settings.scene_reports
         self.reports = self.campaign.document.writes_scene_reports if asked is None else asked
 
@@ -350,7 +350,7 @@ class _CampaignCall:
         finally:
             for judging in list(self.judging.values()):
                 judging.close()
-            session = session.finish(self.judged_count, begun)
+            session = session.finish(self.judged, begun)
             save_campaign(Campaign(self.folder, add_session(document, session)))
 
     def _jobs(
@@ -400,7 +400,7 @@ class _CampaignCall:
     def _take_verdict(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
         judging = self.judging[job.key]
         judging.add_verdict(id, verdict)
-        self.judged_count += 1
+        self.judged[verdict.device] += 1
         self.meter.step(outcome=verdict.outcome, note=self._progress_note())
         if judging.is_done:
             del self.judging[job.key]

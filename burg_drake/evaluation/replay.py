@@ -15,6 +15,7 @@ from burg_drake.core import (
     InvalidInputError,
     MarginNames,
     Margins,
+    MissingDependencyError,
     Mode,
     RecordedFields,
     Stage,
@@ -26,7 +27,7 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation.judge import StationJudge, build_judge, judge_grasp, mode_for
 from burg_drake.evaluation.results_table import RecordedTrial
-from burg_drake.evaluation.run_document import HASH_DIGITS
+from burg_drake.evaluation.run_document import DEVICE_ENTRY, HASH_DIGITS
 from burg_drake.evaluation.run_folder import RUN_FILE, load_run
 from burg_drake.evaluation.trial_origin import (
     TrialOrigin,
@@ -36,9 +37,11 @@ from burg_drake.evaluation.trial_origin import (
 )
 from burg_drake.motion import Plan
 from burg_drake.scene import Scene, load_scene
-from burg_drake.simulation import TrialResult
-from burg_drake.station import GraspMotion, Station, load_station
+from burg_drake.simulation import TrialResult, describe_devices, find_devices
+from burg_drake.station import Engine, GraspMotion, Station, load_station
 
+CPU_DEVICE = "cpu"
+"""Name and description of Warp's CPU device."""
 Document = TypeVar("Document", Scene, Station)
 DocumentSource = tuple[str, Callable[[], Document]]
 
@@ -169,12 +172,64 @@ class Difference:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"
 
 
+@dataclass(frozen=True)
+class ReplayEngine:
+    """Engine that gives recorded trials their verdicts again.
+
+    Attributes:
+        engine: the recorded engine; or that of the same physics on the CPU.
+        device: device of an engine with parallel trials, see `BatchTrial`.
+        description: its name with versions, see `describe_devices`; empty for other engines.
+    """
+
+    engine: Engine
+    device: str | None = None
+    description: str = ""
+
+    def __str__(self) -> str:
+        if not self.engine.parallel:
+            return f"engine {self.engine.name} on the CPU"
+        where = "Warp's CPU device" if self.description == CPU_DEVICE else self.description
+        return f"engine {self.engine.name} on {where}"
+
+    def repeats_bits(self, origin: TrialOrigin) -> bool:
+        """Whether it has the same results as the recorded engine, to the bit, if the versions of
+        all packages are the same."""
+        if not origin.engine.parallel:
+            return True
+        recorded = origin.versions.get(DEVICE_ENTRY, "").replace(" ", "_")
+        return self.engine.parallel and self.description.replace(" ", "_") == recorded
+
+
+def replay_engine(origin: TrialOrigin) -> ReplayEngine:
+    """The recorded engine; for one with parallel trials, that of the same physics on the CPU if
+    this machine lacks a device of the recorded kind: a card, or Warp's CPU device."""
+    if not origin.engine.parallel:
+        return ReplayEngine(origin.engine)
+    device = CPU_DEVICE if origin.versions.get(DEVICE_ENTRY) == CPU_DEVICE else None
+    try:
+        found = find_devices(device)
+    except (InvalidInputError, MissingDependencyError):
+        return ReplayEngine(origin.engine.serial)
+    return ReplayEngine(origin.engine, device, describe_devices(found))
+
+
 def rerun(
-    scene: Scene, station: Station, trial: RecordedTrial, origin: TrialOrigin
+    scene: Scene,
+    station: Station,
+    trial: RecordedTrial,
+    origin: TrialOrigin,
+    engine: ReplayEngine | None = None,
 ) -> tuple[Verdict, Plan | None]:
     """Judges a grasp again with the recorded settings.
 
     The arm is checked only if it decided the outcome, or executed the grasp.
+
+    Args:
+        scene, station: scene and station to judge on.
+        trial: the recorded trial.
+        origin: its origin.
+        engine: engine that judges; `replay_engine` if None.
 
     Returns:
         The verdict, and the plan if the arm executed one.
@@ -182,22 +237,33 @@ def rerun(
     Raises:
         InvalidInputError: this release lacks a setting, or the scene is invalid.
     """
-    judge = judge_of_trial(scene, station, trial, origin)
+    judge = judge_of_trial(scene, station, trial, origin, engine or replay_engine(origin))
     verdict = judge_grasp(judge, trial.candidate)
     return verdict, judge.plan
 
 
 def judge_of_trial(
-    scene: Scene, station: Station, trial: RecordedTrial, origin: TrialOrigin
+    scene: Scene,
+    station: Station,
+    trial: RecordedTrial,
+    origin: TrialOrigin,
+    engine: ReplayEngine | None = None,
 ) -> StationJudge:
-    """The cheapest judge that gives a recorded trial its verdict again: on the CPU, with results
-    that differ by rounding, if it was executed on a graphics card."""
+    """The cheapest judge that gives a recorded trial its verdict again.
+
+    Args:
+        scene, station, trial, origin: see `rerun`.
+        engine: engine that judges. If None, trials are executed one by one on the CPU; then results
+            differ by rounding if it was executed on a graphics card.
+    """
+    engine = engine or ReplayEngine(origin.engine.serial)
     return build_judge(
         scene,
         station,
-        engine=origin.engine.serial,
+        engine=engine.engine,
         mode=mode_for(station, decisive_mode(trial, origin)),
         settings=origin.settings(),
+        device=engine.device,
     )
 
 
@@ -231,22 +297,30 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
     return found
 
 
-def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
-    """Differences as lines of text; `as recorded` if there are none."""
+def comparison(found: Sequence[Difference], origin: TrialOrigin, engine: ReplayEngine) -> list[str]:
+    """Differences as lines of text; `as recorded` if there are none.
+
+    Args:
+        found: the differences.
+        origin: origin of the recorded trial.
+        engine: engine that has judged again.
+    """
     if not found:
         return ["as recorded"]
     if all(difference.rounding for difference in found):
         names = ", ".join(difference.name for difference in found)
         return [f"as recorded, except for the last digits of {names}, which the table rounds"]
-    if origin.engine.parallel and not any(one.name == "outcome" for one in found):
-        single = f"engine {origin.engine.serial.name} on the CPU"
-        return [f"as recorded, but for what {single} rounds in another way", *map(str, found)]
+    has_other_outcome = any(one.name == "outcome" for one in found)
+    if not has_other_outcome and not engine.repeats_bits(origin):
+        return [f"as recorded, but for what {engine} rounds in another way", *map(str, found)]
     there = origin.versions
     here = software_versions({**JUDGING_PACKAGES, **origin.engine.packages})
+    if engine.description:
+        here[DEVICE_ENTRY] = engine.description
     changed = [
         f"{name} {there[name]}, now {here[name]}"
         for name in there
-        if name in here and there[name] != here[name].replace(" ", "_")
+        if name in here and there[name].replace(" ", "_") != here[name].replace(" ", "_")
     ]
     versions = f" (with {'; '.join(changed)})" if changed else ""
     return [f"differs from what was recorded{versions}", *map(str, found)]

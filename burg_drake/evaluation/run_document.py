@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, is_dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from burg_drake.core import Among, Mode, data_root, require_name
+from burg_drake.core import ONE_BY_ONE, Among, Mode, data_root, require_name
 from burg_drake.evaluation.settings import Shard, TableFormat, as_shard
 from burg_drake.evaluation.trial_origin import TrialOrigin
 from burg_drake.scene import Scene
@@ -102,8 +103,10 @@ class WorkSession:
         before: number of grasps that were finished before.
         judged: number of grasps finished by this call; left out if it was killed.
         seconds: duration [s]; left out if it was killed.
-        device: devices of an engine with parallel trials; left out for other engines and on a
-            cluster.
+        device: devices of this machine for an engine with parallel trials; left out for other
+            engines and on a cluster.
+        executed: number of grasps that an engine with parallel trials executed, by the devices of
+            the worker, or `ONE_BY_ONE`; left out for other engines and if the call was killed.
     """
 
     started: str
@@ -112,10 +115,18 @@ class WorkSession:
     judged: int | None = None
     seconds: float | None = None
     device: str = ""
+    executed: dict[str, int] = field(default_factory=dict, hash=False)
 
-    def finish(self, judged: int, begun: float) -> WorkSession:
-        """The finished session, given its judged grasps and its start by `time.monotonic`."""
-        return replace(self, judged=judged, seconds=round(time.monotonic() - begun, 3))
+    def finish(self, judged: Counter[str], begun: float) -> WorkSession:
+        """The finished session.
+
+        Args:
+            judged: number of judged grasps by `Verdict.device`.
+            begun: its start by `time.monotonic`.
+        """
+        executed = {device: n for device, n in sorted(judged.items()) if device and n}
+        seconds = round(time.monotonic() - begun, 3)
+        return replace(self, judged=judged.total(), seconds=seconds, executed=executed)
 
 
 DEVICE_ENTRY = "device"
@@ -292,14 +303,28 @@ def begin_session(workers: int, before: int, device: str = "") -> WorkSession:
 
 def devices_of(document: RunDocument | CampaignDocument) -> list[str]:
     """Devices of a run with an engine with parallel trials, each once: that on which it began, and
-    those of its sessions."""
-    began = document.versions.get(DEVICE_ENTRY, "")
-    names = dict.fromkeys((began, *(session.device for session in document.stretches)))
-    return [name for name in names if name]
+    those of its sessions and of their workers."""
+    names = dict.fromkeys((document.versions.get(DEVICE_ENTRY, ""),))
+    for session in document.stretches:
+        names |= dict.fromkeys((session.device, *session.executed))
+    return [name for name in names if name not in ("", ONE_BY_ONE)]
+
+
+def one_by_one_text(sessions: Sequence[WorkSession]) -> str:
+    """How many grasps an engine with parallel trials executed on the CPU; empty if there are none.
+
+    Args:
+        sessions: sessions of a run; those that were killed do not count.
+    """
+    executed = sum((Counter(session.executed) for session in sessions), Counter[str]())
+    if not executed[ONE_BY_ONE]:
+        return ""
+    return f"{executed[ONE_BY_ONE]} of {executed.total()} executed grasps {ONE_BY_ONE}"
 
 
 def origin_of(document: RunDocument) -> TrialOrigin:
-    """Origin that every row of the run's table records."""
+    """Origin that every row of the run's table records, with all devices of the run."""
+    devices = devices_of(document)
     return TrialOrigin(
         scene=document.scene.path,
         scene_content=document.scene.content[:HASH_DIGITS],
@@ -308,7 +333,7 @@ def origin_of(document: RunDocument) -> TrialOrigin:
         engine=document.engine,
         mode=document.mode,
         trial=document.trial,
-        versions=document.versions,
+        versions=document.versions | ({DEVICE_ENTRY: "; ".join(devices)} if devices else {}),
         seed=document.seed,
         run=document.hash,
     )

@@ -34,7 +34,12 @@ from burg_drake.evaluation.outcome_counts import (
     stage_cost,
 )
 from burg_drake.evaluation.results_table import TextValues, contested_rows
-from burg_drake.evaluation.run_document import devices_of
+from burg_drake.evaluation.run_document import (
+    CampaignDocument,
+    RunDocument,
+    devices_of,
+    one_by_one_text,
+)
 from burg_drake.evaluation.run_folder import Run
 from burg_drake.evaluation.trial_origin import protocol_of, read_motion
 from burg_drake.station import GraspMotion
@@ -53,9 +58,9 @@ def run_notes(run: Run) -> tuple[str, ...]:
     """Notes on a run, one sentence each.
 
     They name usual mistakes in given grasps, instances with fewer grasps than asked for or with
-    none given, several devices and, once its grasps are judged, each object without executed
-    grasps, or with too few lifted or failing grasps for a balanced run; and a lift or retreat on
-    which most grasps fail.
+    none given, several devices, grasps that a card left to the CPU and, once its grasps are judged,
+    each object without executed grasps, or with too few lifted or failing grasps for a balanced
+    run; and a lift or retreat on which most grasps fail.
     """
     grasps = run.document.grasps
     missing = ""
@@ -67,7 +72,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
         *([missing] if missing else []),
         *run_shortfall_notes(run),
         *_protocol_notes(run),
-        *_device_notes(run),
+        *_device_notes(run.document),
         *_unexecuted_notes(run),
         *_motion_notes(run),
         *_balance_notes(run),
@@ -84,15 +89,16 @@ def _protocol_notes(run: Run) -> list[str]:
     ]
 
 
-def _device_notes(run: Run) -> list[str]:
-    """A note on a run that was continued on another device."""
-    devices = devices_of(run.document)
-    if len(devices) < 2:
-        return []
-    return [
-        f"the grasps were judged on {len(devices)} devices, whose results may differ by rounding:"
-        f" {'; '.join(devices)}"
-    ]
+def _device_notes(document: RunDocument | CampaignDocument) -> list[str]:
+    """Notes on a run on several devices, and on grasps that were executed on the CPU instead."""
+    devices, one_by_one = devices_of(document), one_by_one_text(document.stretches)
+    notes = [f"{one_by_one}; the others in parallel"] if one_by_one else []
+    if len(devices) > 1:
+        notes.append(
+            f"the grasps were judged on {len(devices)} devices, whose results may differ by"
+            f" rounding: {'; '.join(devices)}"
+        )
+    return notes
 
 
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:
@@ -466,6 +472,7 @@ class _CodedRows:
 def _campaign_notes(campaign: Campaign) -> tuple[str, ...]:
     max_listed = 5  # Scenes with too few grasps that are listed with their notes.
     states, notes = campaign.states, [*campaign.document.hints]
+    notes += _device_notes(campaign.document)
     if empty := [n for n in campaign.names if n in states and states[n].state == "empty"]:
         notes.append(f"{len(empty)} scenes have no grasps to judge: {list_names(empty)}")
     if failed := list(campaign.failed):

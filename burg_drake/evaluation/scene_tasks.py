@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -77,7 +77,7 @@ class SceneJudging:
         failed = np.setdiff1d(np.flatnonzero(index.failed), left).tolist()
         ids = run.candidates.id
         self._failed = {ids[row]: bool(index.interrupted[row]) for row in failed}
-        self._judged = 0
+        self._judged: Counter[str] = Counter()
         self._workers, self._device = workers, request.device_text()
         self._candidate_count = len(self._run.candidates)
         self._shortfall_notes = "; ".join(run_shortfall_notes(self._run))
@@ -86,7 +86,7 @@ class SceneJudging:
     @property
     def is_done(self) -> bool:
         """Whether all grasps are judged."""
-        return self._judged == len(self.left)
+        return self._judged.total() == len(self.left)
 
     def begin(self) -> None:
         """Records in the run's document that a session begins."""
@@ -98,13 +98,13 @@ class SceneJudging:
         """Writes a verdict to the journal."""
         assert self._journal is not None
         self._journal.append(id, verdict)
-        self._judged += 1
+        self._judged[verdict.device] += 1
         if verdict.outcome is Outcome.SIMULATION_FAILED:
             self._failed[id] = verdict.interrupted
 
     def is_part_due(self) -> bool:
         """Whether enough grasps were judged since the last part to write another."""
-        return self._judged % PART_ROWS == 0
+        return self._judged.total() % PART_ROWS == 0
 
     def close(self) -> None:
         """Records the finished session in the run's document, and closes the journal."""

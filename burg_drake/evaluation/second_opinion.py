@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -225,7 +226,7 @@ def _judge_scenes(
         runs = (load_run(campaign.folder(name)) for name in names)
         session, begun = begin_session(executor.workers, sum(contested.values())), time.monotonic()
         judged = _judge_contested(runs, sum(contested.values()), engine, executor, reporter, finish)
-        if judged:
+        if judged.total():
             document = _add_second_session(document, session.finish(judged, begun), engine)
             save_campaign(Campaign(campaign.path, document))
         update_parts(campaign)
@@ -241,8 +242,9 @@ def _judge_contested(
     executor: Executor,
     reporter: Reporter,
     finish: Callable[[Run], None],
-) -> int:
-    """Judges the contested grasps of runs again; returns the number of new verdicts.
+) -> Counter[str]:
+    """Judges the contested grasps of runs again; returns the number of new verdicts by their
+    `device`.
 
     Args:
         runs: the runs, opened when workers run out of work.
@@ -252,7 +254,7 @@ def _judge_contested(
     """
     opened: dict[str, _ContestedRun] = {}
     meter = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
-    judged = 0
+    judged: Counter[str] = Counter()
 
     def jobs() -> Iterator[Job]:
         for run in runs:
@@ -267,7 +269,7 @@ def _judge_contested(
         with closing(executor.judge(jobs())) as verdicts:
             for job, candidate, verdict in verdicts:
                 settling = opened[job.key]
-                judged += settling.write_verdict(candidate, verdict)
+                judged[verdict.device] += settling.write_verdict(candidate, verdict)
                 meter.step(outcome=verdict.outcome)
                 if not settling.open:
                     finish(opened.pop(job.key).close())
@@ -297,7 +299,7 @@ class _ContestedRun:
         self.left = [run.trial(id).candidate for id in run.contested]
         self.open = len(self.left)
         self._session, self._begun = begin_session(workers, run.rows().count), time.monotonic()
-        self._judged = 0
+        self._judged: Counter[str] = Counter()
         if self.left:
             try:
                 require_scene_for(ENGINES[engine], run.scene(), run.station())
@@ -322,7 +324,7 @@ class _ContestedRun:
             return False
         before = self._run.verdicts[candidate.id]
         self._journal.append(candidate.id, settle_verdict(before, verdict, self._engine))
-        self._judged += 1
+        self._judged[verdict.device] += 1
         return True
 
     def close(self) -> Run:

@@ -1,6 +1,7 @@
 from .arm_trial import ArmTrial as ArmTrial
 from .batch.batch_trial import BatchTrial as BatchTrial
 from .batch.warp_device import (
+    claimed as claimed,
     describe_devices as describe_devices,
     find_devices as find_devices,
     kernels_are_compiled as kernels_are_compiled,

@@ -95,8 +95,5 @@ class SweptBoxes:
 def _boxes_meet(a: tuple[Array, Array], b: tuple[Array, Array]) -> NDArray[np.bool_]:
     """(N, K, Q) whether boxes with corners (N, K, 3) meet boxes with corners (N, Q, 3)."""
     (a_low, a_high), (b_low, b_high) = a, b
-    meet = np.ones((max(len(a_low), len(b_low)), a_low.shape[1], b_low.shape[1]), dtype=bool)
-    for axis in range(3):
-        meet &= a_low[:, :, None, axis] <= b_high[:, None, :, axis]
-        meet &= a_high[:, :, None, axis] >= b_low[:, None, :, axis]
-    return meet
+    meet = (a_low[:, :, None] <= b_high[:, None]) & (a_high[:, :, None] >= b_low[:, None])
+    return np.asarray(meet.all(axis=-1))

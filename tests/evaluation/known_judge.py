@@ -81,11 +81,13 @@ class KnownJudge:
     Attributes:
         pause: before each grasp that is executed [s]: verdicts of the others come at once.
         batches: grasps that are screened at a time, by screen.
+        devices: those that execute grasps, in turn.
     """
 
     log: Path | None = None
     pause: float = 0.0
     batches: tuple[int, int] = (512, 16)
+    devices: tuple[str, ...] = ("",)
 
     @property
     def screens(self) -> Sequence[Screen]:
@@ -129,6 +131,7 @@ class KnownJudge:
             turned={min(others): 50.0 * moved},
             toppled=min(others) if moved > TOPPLED else "",
             confidence=confidence(grasp.id),
+            device=self.devices[n % len(self.devices)],
         )
 
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,19 +16,29 @@ import numpy as np
 import pytest
 from asked import asked
 from inline_executor import Inline
-from known_judge import JUDGE_FACTORY, KnownJudge, Make, ShortOfMemory, expected, install
+from known_judge import JUDGE_FACTORY, KnownJudge, Make, ShortOfMemory, expected, install, number
 
-from burg_drake.core import GraspSet, InvalidInputError, Progress, UnknownNameError, make_pose
+from burg_drake.core import (
+    ONE_BY_ONE,
+    GraspSet,
+    InvalidInputError,
+    Progress,
+    Stage,
+    UnknownNameError,
+    make_pose,
+)
 from burg_drake.evaluation import (
     TEXT_COLUMNS,
     EvaluationSettings,
     Run,
     evaluate,
     load_run,
+    merge_runs,
     read_grasps,
     read_journal,
     read_table,
     reproduce_command,
+    run_notes,
 )
 from burg_drake.scene import Scene
 from burg_drake.station import Station
@@ -57,6 +68,37 @@ def test_results_do_not_depend_on_workers(
         scene, station, tmp_path / "other", **asked(seed=1, executor=Inline(), **options)
     )
     assert not same_results(one, other)
+
+
+def test_sessions_count_the_grasps_of_each_device_whoever_judges(
+    scene: Scene, station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Worker processes here, and an executor like that of a cluster, stopped and continued."""
+    install(monkeypatch.setattr)
+    cards = [f"NVIDIA {name} (driver supports CUDA 12.8, x: 1)" for name in ("A100", "H100")]
+    make = Make(KnownJudge(devices=(*cards, ONE_BY_ONE)))
+    monkeypatch.setattr(JUDGE_FACTORY, lambda *_: make)
+    options = asked(grasps_per_object=20, blind=True, progress=False)
+    run = evaluate(scene, station, tmp_path / "run", workers=2, **options)
+    tried = [id for id in run.candidates.id if expected(id).stage is Stage.EXECUTED]
+    counts = Counter(make.judge.devices[number(id) % 3] for id in tried)
+    (session,) = run.document.stretches
+    assert session.executed == counts and len(counts) == 3
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(scene, station, tmp_path / "other", executor=Inline(stop=30), **options)
+    other = evaluate(scene, station, tmp_path / "other", executor=Inline(), **options)
+    first, second = other.document.stretches
+    assert first.executed and second.executed
+    assert Counter(first.executed) + Counter(second.executed) == counts
+    assert first.judged == 30 and "device" not in other.document.versions
+    merged = merge_runs([tmp_path / "other"], tmp_path / "merged")
+    note = f"{counts[ONE_BY_ONE]} of {len(tried)} executed grasps {ONE_BY_ONE}"
+    for one in (other, load_run(other.path), merged):
+        notes = run_notes(one)
+        assert f"{note}; the others in parallel" in notes
+        assert any("on 2 devices" in text and "; ".join(cards) in text for text in notes)
+    (versions,) = set(other.results["versions"].tolist())
+    assert f"device={'; '.join(cards)}".replace(" ", "_") in versions
 
 
 def test_a_complete_run_returns_at_once(

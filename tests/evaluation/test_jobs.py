@@ -16,10 +16,11 @@ from known_judge import (
     ParallelJudge,
     die,
     expected,
+    number,
     refuse,
 )
 
-from burg_drake.core import DeviceError, InvalidInputError, Outcome
+from burg_drake.core import ONE_BY_ONE, DeviceError, InvalidInputError, Outcome
 from burg_drake.evaluation import (
     Candidate,
     Job,
@@ -142,6 +143,19 @@ def test_workers_without_one_get_few_and_lost_ones_alone(scene, station) -> None
     assert len(lost.items) == 32
     assert not list(job.retry_alone(lost))
     assert [len(job.take_chunk(1).items) for _ in range(33)] == [*[1] * 32, 32]
+
+
+def test_verdicts_from_a_cluster_name_the_device_of_their_worker() -> None:
+    tasks = pytest.importorskip("burg_drake.evaluation.cluster.worker_tasks")
+    children = tasks.Supervisor("run")
+    children.setup(None)
+    judge = ParallelJudge(devices=("NVIDIA H100", ONE_BY_ONE))
+    sent = Job("a", Make(judge), grasps("a", 40))
+    answer = children.judge(sent, WorkerLimits())
+    children.teardown(None)
+    for place, verdict in answer.verdicts:
+        assert verdict.device == judge.devices[number(sent.candidates[place].id) % 2]
+    assert {verdict.device for _, verdict in answer.verdicts} == {*judge.devices}
 
 
 def test_a_card_that_fails_on_a_cluster_fails_the_job_and_decides_nothing() -> None:

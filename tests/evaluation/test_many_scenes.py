@@ -10,11 +10,19 @@ import numpy as np
 import pytest
 from asked import asked
 from inline_executor import Inline
-from known_judge import JUDGE_FACTORY, expected, refuse
+from known_judge import JUDGE_FACTORY, KnownJudge, Make, expected, number, refuse
 from known_many import OPTIONS, run_all, same
 from page_reading import read_page
 
-from burg_drake.core import GraspSet, InvalidInputError, Outcome, UnknownNameError, make_pose
+from burg_drake.core import (
+    ONE_BY_ONE,
+    GraspSet,
+    InvalidInputError,
+    Outcome,
+    Stage,
+    UnknownNameError,
+    make_pose,
+)
 from burg_drake.evaluation import (
     TEXT_COLUMNS,
     Campaign,
@@ -57,6 +65,28 @@ def test_each_scene_is_as_on_its_own(
     for name in ("cube", "bar"):
         (group,) = [g for g in summary.objects if g.name == name]
         assert group.judged == sum(g.judged for s in own for g in s.objects if g.name == name)
+
+
+def test_sessions_count_the_grasps_of_each_device(
+    scenes: list[Path],
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In the run over many scenes, and in that of each scene."""
+    make = Make(KnownJudge(devices=("NVIDIA H100", ONE_BY_ONE)))
+    monkeypatch.setattr(JUDGE_FACTORY, lambda *_: make)
+    campaign = run_all(scenes, station, tmp_path / "all")
+    ids = [id for run in load_runs(campaign.path) for id in run.candidates.id]
+    tried = [id for id in ids if expected(id).stage is Stage.EXECUTED]
+    counts = Counter(make.judge.devices[number(id) % 2] for id in tried)
+    (session,) = campaign.document.stretches
+    assert session.executed == counts and len(counts) == 2
+    runs = [one.document.stretches[0].executed for one in load_runs(campaign.path)]
+    assert sum(map(Counter, runs), Counter()) == counts
+    note = f"{counts[ONE_BY_ONE]} of {len(tried)} executed grasps {ONE_BY_ONE}"
+    assert any(text.startswith(note) for text in summarize(campaign).notes)
 
 
 def test_any_program_reads_the_parts(whole: Campaign) -> None:

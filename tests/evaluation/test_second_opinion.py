@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from known_judge import Make, SecondJudge, confidence, expected
+from known_judge import KnownJudge, Make, SecondJudge, confidence, expected
 
 from burg_drake.core import InvalidInputError, Outcome, Stage, UnknownNameError
 from burg_drake.evaluation import (
@@ -64,6 +64,17 @@ def test_the_second_engine_settles_them(own_run: Run, second: None) -> None:
     assert summarize(run).total.lifted == summarize(own_run).total.lifted + sum(
         expected(id) is not Outcome.LIFTED for id in asked
     )
+
+
+def test_a_second_session_counts_the_grasps_of_its_devices(
+    own_run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PLACE, lambda *_: Make(KnownJudge(devices=("NVIDIA H100",))))
+    run = judge_again(own_run, workers=1, progress=False)
+    assert [session.executed for session in run.document.stretches] == [
+        {},
+        {"NVIDIA H100": len(own_run.contested)},
+    ]
 
 
 def test_the_status_counts_each_grasp_once(own_run: Run, second: None) -> None:

@@ -6,9 +6,11 @@ the order of contacts around.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,6 +39,7 @@ from burg_drake.simulation import (
     ShakeSettings,
     TrialResult,
     TrialSettings,
+    claimed,
     describe_devices,
     find_devices,
     kernels_are_compiled,
@@ -282,7 +285,7 @@ def test_a_touched_neighbour_moves(crowd: BatchTrial) -> None:
     (result,) = crowd.run("box", X_OG[None])
     assert_alike(result, crowd.single.run("box", X_OG))
     assert result.displacements["beside"] == result.margins.others_moved > 0.001
-    assert crowd.on_cpu == 0
+    assert crowd.on_cpu == 0 and not result.on_cpu
 
 
 @pytest.mark.thorough
@@ -453,7 +456,7 @@ def test_trials_that_fit_into_no_room_are_executed_on_the_cpu(
     X_OG, friction, _ = columns
     batch = batch_of(scene)
     (result,) = batch.run("box", X_OG[[4]], friction=friction[[4]])
-    assert batch.on_cpu == 1
+    assert batch.on_cpu == 1 and result.on_cpu
     assert exact(result) == exact(batch.single.run("box", X_OG[4], friction=float(friction[4])))
 
 
@@ -539,6 +542,57 @@ def test_cards_are_described_with_what_their_driver_supports(
     monkeypatch.setattr(wp, "get_cuda_toolkit_version", lambda: (12, 9))
     told = "NVIDIA H100 (driver supports CUDA 12.8, Warp is built with CUDA 12.9)"
     assert describe_devices([card, card]) == told
+
+
+def test_a_card_is_used_by_one_process_at_a_time(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Another process takes a free card, or waits for one; also if the owner is killed."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    cards = [SimpleNamespace(is_cuda=True, uuid=f"GPU-{k}") for k in range(2)]
+    with owner_of(cards[0], tmp_path) as owner:
+        with claimed(cards) as card:
+            assert card is cards[1]
+        taken: list[Any] = []
+        waiting = threading.Thread(target=lambda: taken.append(enter(claimed(cards[:1]))))
+        waiting.start()
+        waiting.join(0.3)
+        assert waiting.is_alive() and not taken
+        owner.kill()
+        waiting.join(10.0)
+        assert taken == cards[:1]
+
+
+def enter(context: Any) -> Any:
+    with context as value:
+        return value
+
+
+@contextmanager
+def owner_of(card: Any, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """A process that has claimed a card."""
+    program = (
+        "import sys, tempfile; from types import SimpleNamespace;"
+        " from burg_drake.simulation import claimed; tempfile.tempdir = sys.argv[1]\n"
+        "with claimed([SimpleNamespace(is_cuda=True, uuid=sys.argv[2])]):"
+        " print('claimed', flush=True); sys.stdin.read()"
+    )
+    words = [sys.executable, "-c", program, str(folder), card.uuid]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, **pipes) as process:
+        assert process.stdout is not None and process.stdout.readline() == "claimed\n"
+        yield process
+        process.kill()
+
+
+def test_the_cpu_is_used_by_any_number_of_processes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    cpu = SimpleNamespace(is_cuda=False)
+    with claimed([cpu]) as one, claimed([cpu]) as other:
+        assert one is other is cpu
+    assert not list(tmp_path.iterdir())
 
 
 # --- refusals -------------------------------------------------------------------------------------

@@ -122,41 +122,49 @@ class _Replay:
 
 def _replay(source: ReplaySource, meshcat: Any) -> _Replay:
     """Simulates a trial again, recorded in Meshcat."""
-    verdict, shown, shown_part = _simulate_trial(source, meshcat)
+    engine = evaluation.replay_engine(source.origin)
+    verdict, shown, shown_part = _simulate_trial(source, engine, meshcat)
     lines = [
         *visualization.describe_trial(evaluation.as_result(verdict)),
         *evaluation.arm_figures(verdict),
     ]
     lines += evaluation.motion_figures(source.trial, source.origin)
     if source.origin.engine.parallel:
-        lines.append(f"simulated by engine {source.origin.engine.serial.name}, on the CPU")
+        lines.append(f"judged again by {engine}")
     recorded = source.trial.verdict
     differences = [] if recorded is None else evaluation.differences(recorded, verdict)
-    lines += [] if recorded is None else evaluation.comparison(differences, source.origin)
+    if recorded is not None:
+        lines += evaluation.comparison(differences, source.origin, engine)
     if shown.outcome is not verdict.outcome:
         lines += [f"shown is {shown_part}, to the end:", *visualization.describe_trial(shown)]
     as_recorded = all(difference.rounding for difference in differences)
-    if source.origin.engine.parallel and recorded is not None:
+    if recorded is not None and not engine.repeats_bits(source.origin):
         as_recorded = verdict.outcome is recorded.outcome
     return _Replay(lines, float(shown.margins.end_time), as_recorded)
 
 
 def _simulate_trial(
-    source: ReplaySource, meshcat: Any
+    source: ReplaySource, engine: evaluation.ReplayEngine, meshcat: Any
 ) -> tuple[core.Verdict, simulation.TrialResult, str]:
     """The verdict of the row's engine, the whole trial to show, and a text on what is shown.
 
     With an engine that ends trials early, the trial is simulated twice: as recorded, and to the end
-    for the view. So is a trial of the arm, which is shown from its home posture on.
+    for the view. So is a trial of the arm, which is shown from its home posture on, and one that
+    is judged in parallel, which is shown as the CPU executes it.
     """
     trial, origin = source.trial, source.origin
-    if evaluation.decisive_mode(trial, origin) == "hand" and origin.engine.whole_trial:
+    is_whole = engine.engine.whole_trial and not engine.engine.parallel
+    if evaluation.decisive_mode(trial, origin) == "hand" and is_whole:
         shown = _show_hand(source, meshcat)
         return evaluation.trial_verdict(shown), shown, "the hand alone"
-    verdict, plan = evaluation.rerun(source.inputs.scene, source.inputs.station, trial, origin)
+    if note := evaluation.starting_note(engine.engine, engine.device):
+        print_remark(note)
+    inputs = source.inputs
+    verdict, plan = evaluation.rerun(inputs.scene, inputs.station, trial, origin, engine)
     if plan is not None:
         return verdict, _show_arm(source, plan, meshcat), "the arm from home on"
-    return verdict, _show_hand(source, meshcat), "the hand alone"
+    shown_part = "the hand alone, on the CPU" if engine.engine.parallel else "the hand alone"
+    return verdict, _show_hand(source, meshcat), shown_part
 
 
 def _show_hand(source: ReplaySource, meshcat: Any) -> simulation.TrialResult:

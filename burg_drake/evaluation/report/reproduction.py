@@ -8,7 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core import count_with_noun, format_duration, load_document, option_name
+from burg_drake.core import (
+    ONE_BY_ONE,
+    count_with_noun,
+    format_duration,
+    load_document,
+    option_name,
+)
 from burg_drake.evaluation.campaign_folder import Campaign
 from burg_drake.evaluation.journal import JOURNAL_FILE
 from burg_drake.evaluation.report.page_elements import ReportSection
@@ -18,6 +24,7 @@ from burg_drake.evaluation.run_document import (
     Input,
     RunDocument,
     devices_of,
+    one_by_one_text,
 )
 from burg_drake.evaluation.run_folder import GRASPS_FILE, RUN_FILE, STATION_FILE, Run
 from burg_drake.evaluation.settings import DEFAULT_LIMITS, EvaluationSettings
@@ -201,7 +208,8 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
     packages = ("burg_drake", "drake", "python")
     approach = "; its approach is simulated" if document.trial.get("approach") else ""
     names = (*packages, *document.engine.packages)
-    devices = devices_of(document)
+    devices = [*devices_of(document), one_by_one_text(document.stretches)]
+    device = "; ".join(text for text in devices if text)
     return [
         ("station", _content_text(document.station)),
         ("mode", f"{document.mode}: {MODE_MEANINGS[document.mode]}{approach}"),
@@ -209,7 +217,7 @@ def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, s
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
         ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
-        *([("device", "; ".join(devices))] if devices else []),
+        *([("device", device)] if device else []),
     ]
 
 
@@ -282,6 +290,9 @@ def _session_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, 
         judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
         took = "" if session.seconds is None else f" in {format_duration(session.seconds)}"
         text = f"{session.started}: {judged}{took}, {count_with_noun(session.workers, 'worker')}"
-        text += f", on {session.device}" if session.device else ""
+        devices = [name for name in session.executed if name != ONE_BY_ONE] or [session.device]
+        text += f", on {'; '.join(devices)}" if any(devices) else ""
+        if one_by_one := one_by_one_text([session]):
+            text += f"; {one_by_one}"
         lines.append(("judged", text))
     return [*lines, ("command", document.command)]

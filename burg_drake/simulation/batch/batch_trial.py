@@ -304,13 +304,14 @@ class _Batch:
         """Executes open grasps on the CPU; returns their number."""
         rows, loads = self._open_rows(), self._loads
         for k in rows.tolist():
-            self._results[k] = self._trial.run(
+            result = self._trial.run(
                 self._instance,
                 self._X_OG[k],
                 friction=float(loads.friction[k]),
                 mass=float(loads.mass[k]),
                 lift=float(loads.lift[k]),
             )
+            self._results[k] = replace(result, on_cpu=True)
         return len(rows)
 
     def _open_rows(self) -> Indices:
