@@ -11,7 +11,12 @@ import numpy as np
 
 from burg_drake.core import Array, atomic_write, quaternion_from_rotation
 from burg_drake.export.layout import PlacedObject
-from burg_drake.export.object_parts import VisualPart, collision_meshes, visual_parts
+from burg_drake.export.object_parts import (
+    VisualPart,
+    collision_meshes,
+    surface_hulls,
+    visual_parts,
+)
 from burg_drake.objects import ObjectEntry, ObjectLibrary
 
 
@@ -65,8 +70,8 @@ class MjcfAssets:
         Args:
             asset: element that the assets are declared in.
             library: library with the objects.
-            folder: folder of the MJCF file; if None, nothing is written, pieces are read from the
-                library, and there are no visuals.
+            folder: folder of the MJCF file; if None, as for grasp trials, nothing is written, there
+                are no visuals, and pieces follow the surface of objects whose surface touches.
         """
         self._asset = asset
         self._library = library
@@ -84,8 +89,17 @@ class MjcfAssets:
     def pieces(self, name: str, entry: ObjectEntry) -> list[str]:
         """Names of the meshes of an object's convex pieces."""
         if name not in self._pieces:
-            pieces = collision_meshes(entry)
-            self._pieces[name] = [self._add_piece(name, i, piece) for i, piece in enumerate(pieces)]
+            touches = entry.contact.kind in ("surface", "mesh") and bool(entry.pieces)
+            sources: list[dict[str, str]]
+            if self._folder is None and touches:
+                hulls = surface_hulls(self._library, name)
+                sources = [{"vertex": format_numbers(hull)} for hull in hulls]
+            else:
+                files = collision_meshes(entry)
+                sources = [{"file": self._piece_file(name, i, f)} for i, f in enumerate(files)]
+            self._pieces[name] = [f"{name}:piece_{i:03d}" for i in range(len(sources))]
+            for mesh, source in zip(self._pieces[name], sources, strict=True):
+                SubElement(self._asset, "mesh", {"name": mesh, **source, "inertia": "convex"})
         return self._pieces[name]
 
     def _add_visual(self, name: str, i: int, part: VisualPart) -> str:
@@ -105,16 +119,15 @@ class MjcfAssets:
         SubElement(self._asset, "material", {"name": mesh, "specular": "0.1", **appearance})
         return mesh
 
-    def _add_piece(self, name: str, i: int, piece: str) -> str:
-        mesh, file = f"{name}:piece_{i:03d}", f"objects/{name}/pieces/{i:03d}.obj"
+    def _piece_file(self, name: str, i: int, piece: str) -> str:
+        """File of a piece as the model names it; copied to the folder, if there is one."""
         if self._folder is None:
-            file = str(self._library.path(piece).resolve())
-        else:
-            target = self._folder / file
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(self._library.path(piece), target)
-        SubElement(self._asset, "mesh", {"name": mesh, "file": file, "inertia": "convex"})
-        return mesh
+            return str(self._library.path(piece).resolve())
+        file = f"objects/{name}/pieces/{i:03d}.obj"
+        target = self._folder / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(self._library.path(piece), target)
+        return file
 
 
 def obj_text(part: VisualPart) -> str:

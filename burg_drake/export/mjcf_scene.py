@@ -136,7 +136,7 @@ def trial_mjcf(
     on_table: Collection[str],
     alone: str | None = None,
 ) -> str:
-    """The model of grasp trials as text; meshes are read from the library.
+    """The model of grasp trials as text; its pieces follow the surface of the objects.
 
     Args:
         layout: objects, table and obstacles.
