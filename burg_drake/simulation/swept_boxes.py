@@ -67,7 +67,7 @@ class SweptBoxes:
         low, high = self._swept_bounds(X_WG, X_WO, p_W, min_gap)
         # Most paths are free already by one box around all that moves.
         around = low.min(axis=1, keepdims=True), high.max(axis=1, keepdims=True)
-        near = _boxes_meet(around, others).any(axis=(1, 2))
+        near = np.asarray(_boxes_meet(around, others).any(axis=(1, 2)))
         rows = np.flatnonzero(near)
         pairs = _boxes_meet((low[rows], high[rows]), others)
         left = pairs.any(axis=(1, 2))

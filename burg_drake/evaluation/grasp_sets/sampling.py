@@ -143,7 +143,7 @@ class ClearanceFilter:
             blocker = found.blocker
         else:
             blocker = self._screen.blockers(self._name, X_WG, self._mode)
-        passed = blocker == ""
+        passed = np.asarray(blocker == "")
         self.blocked.update(blocker[~passed].tolist())
         clear = np.flatnonzero(passed)
         contacts = grasp_contacts(self._surface, X_OG[clear], self._jaws)
