@@ -12,7 +12,6 @@ from pydrake.geometry import (
     GeometryId,
     GeometrySet,
     ProximityProperties,
-    RoleAssign,
     SceneGraph,
 )
 from pydrake.multibody.plant import ContactResults, CoulombFriction, MultibodyPlant
@@ -20,7 +19,12 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array
-from burg_drake.station import StationDiagram, collision_geometries, touching_bodies
+from burg_drake.station import (
+    StationDiagram,
+    assign_contact,
+    collision_geometries,
+    touching_bodies,
+)
 
 
 @dataclass(frozen=True)
@@ -261,14 +265,15 @@ def assign_friction(
         bodies: bodies of the plant.
         friction: static and dynamic coefficient.
     """
-    graph, source = built.scene_graph, built.plant.get_source_id()
-    context = graph.GetMyMutableContextFromRoot(root)
+    graph = built.scene_graph
+    query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(root))
+    changed = {}
     for geometry in collision_geometries(built.plant, bodies):
-        known = graph.model_inspector().GetProximityProperties(geometry)
-        properties = ProximityProperties(known)
+        properties = ProximityProperties(query.inspector().GetProximityProperties(geometry))
         coulomb = CoulombFriction(friction, friction)
         properties.UpdateProperty("material", "coulomb_friction", coulomb)
-        graph.AssignRole(context, source, geometry, properties, RoleAssign.kReplace)
+        changed[geometry] = properties
+    assign_contact(built, root, changed)
 
 
 def freeze_bodies(built: StationDiagram, root: Context, bodies: Collection[BodyIndex]) -> None:

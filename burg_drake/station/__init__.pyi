@@ -49,6 +49,7 @@ from .object_bodies import (
     VERTICAL_JOINT_NAME as VERTICAL_JOINT_NAME,
 )
 from .object_contact import (
+    assign_contact as assign_contact,
     collision_geometries as collision_geometries,
     filter_contact_pairs as filter_contact_pairs,
     make_compliant as make_compliant,

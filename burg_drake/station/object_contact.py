@@ -157,20 +157,45 @@ def make_touching_compliant(station_diagram: StationDiagram) -> None:
     )
 
 
-def make_compliant(station_diagram: StationDiagram, names: Iterable[str]) -> None:
+def make_compliant(
+    station_diagram: StationDiagram,
+    names: Iterable[str],
+    *,
+    if_rigid: bool = False,
+    dissipation: float = SurroundingsProperties.dissipation,
+) -> dict[str, dict[GeometryId, ProximityProperties]]:
     """Makes free objects compliant, in all Contexts that are created from now on. Rigid meshes
-    cannot be compliant, and balls have point contact with everything; both are unchanged."""
+    cannot be compliant, and balls have point contact with everything; both are unchanged.
+
+    Args:
+        station_diagram: a built diagram.
+        names: the objects.
+        if_rigid: leave geometries as they are that are compliant already.
+        dissipation: Hunt-Crossley's [s/m].
+
+    Returns:
+        The replaced properties of each object's geometries.
+    """
     plant, scene = station_diagram.plant, station_diagram.scene
+    inspector = station_diagram.scene_graph.model_inspector()
+    replaced: dict[str, dict[GeometryId, ProximityProperties]] = defaultdict(dict)
     for name in names:
-        if not has_mesh_contact(scene, name) and not is_ball(scene, name):
-            body = plant.get_body(station_diagram.free[name])
-            for geometry in list(plant.GetCollisionGeometriesForBody(body)):
-                if geometry in station_diagram.parts.all:
-                    continue
-                _make_geometry_compliant(station_diagram, geometry)
+        if has_mesh_contact(scene, name) or is_ball(scene, name):
+            continue
+        for geometry in plant.GetCollisionGeometriesForBody(
+            plant.get_body(station_diagram.free[name])
+        ):
+            before = ProximityProperties(inspector.GetProximityProperties(geometry))
+            is_compliant = before.HasProperty("hydroelastic", "hydroelastic_modulus")
+            if geometry not in station_diagram.parts.all and not (if_rigid and is_compliant):
+                _make_geometry_compliant(station_diagram, geometry, dissipation)
+                replaced[name][geometry] = before
+    return dict(replaced)
 
 
-def _make_geometry_compliant(station_diagram: StationDiagram, geometry: GeometryId) -> None:
+def _make_geometry_compliant(
+    station_diagram: StationDiagram, geometry: GeometryId, dissipation: float
+) -> None:
     modulus = 5e7  # Pascal; with 1e7 an edge sinks into another object by more than 1 mm.
     graph = station_diagram.diagram.mutable_scene_graph()
     inspector = graph.model_inspector()
@@ -180,12 +205,24 @@ def _make_geometry_compliant(station_diagram: StationDiagram, geometry: Geometry
     properties = ProximityProperties()
     AddCompliantHydroelasticProperties(hint, modulus, properties)
     AddContactMaterial(
-        dissipation=SurroundingsProperties.dissipation,
+        dissipation=dissipation,
         friction=rigid.GetProperty("material", "coulomb_friction"),
         properties=properties,
     )
     source = station_diagram.plant.get_source_id()
     graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
+
+
+def assign_contact(
+    station_diagram: StationDiagram,
+    root: Context,
+    properties: Mapping[GeometryId, ProximityProperties],
+) -> None:
+    """Replaces contact properties of geometries in a Context of the whole diagram."""
+    graph, source = station_diagram.scene_graph, station_diagram.plant.get_source_id()
+    context = graph.GetMyMutableContextFromRoot(root)
+    for geometry, own in properties.items():
+        graph.AssignRole(context, source, geometry, own, RoleAssign.kReplace)
 
 
 def replace_meshes_by_pieces(station_diagram: StationDiagram, context: Context) -> None:

@@ -15,6 +15,7 @@ from oracle.hand import PAD, Phases
 from oracle.lathe import arc, bent, hexagonal, lathe, line, polyline, stretched
 from oracle.solid import Solid, mass_properties
 from oracle.trial import Grip, Trial
+from oracle.two_boxes import TwoBoxes, farthest, simulate
 
 GRAVITY, FORCE = 9.81, 40.0
 pytestmark = pytest.mark.thorough
@@ -255,3 +256,51 @@ def test_hard_cases() -> None:
 def test_inverse() -> None:
     X = pose(rotation((1.0, 2.0, 3.0), 0.7), np.array((1.0, 2.0, 3.0)))
     assert inverse(X) @ X == pytest.approx(np.eye(4), abs=1e-12)
+
+
+# --- two boxes in a plane -------------------------------------------------------------------------
+
+
+BOXES = TwoBoxes(
+    half=np.array([[0.15, 0.02], [0.025, 0.025]]),
+    mass=np.array([0.2, 0.1]),
+    friction=np.array([0.3, 0.3, 0.0]),
+)
+
+
+def test_a_box_slides_until_friction_stops_it() -> None:
+    start = np.array([[0.0, 0.02, 0.0], [1.0, 0.025, 0.0]])
+    speed = np.array([[0.6, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    poses = simulate(BOXES, start, speed, 0.5)
+    way = farthest(BOXES.half[0], start[0], poses[:, 0])
+    assert way == pytest.approx(0.6**2 / (2.0 * 0.3 * GRAVITY), rel=1e-3)
+    assert farthest(BOXES.half[1], start[1], poses[:, 1]) < 1e-5
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_box_that_slides_into_another_keeps_the_momentum(restitution: float) -> None:
+    """On a table without friction, whatever turns when they meet."""
+    smooth = dataclasses.replace(BOXES, friction=np.zeros(3))
+    start = np.array([[-0.185, 0.02, 0.0], [0.0, 0.025, 0.0]])
+    speed = np.array([[0.6, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    poses = simulate(smooth, start, speed, 0.2, restitution=restitution)
+    moved = smooth.mass @ (poses[-1, :, 0] - start[:, 0])
+    assert moved == pytest.approx(smooth.mass[0] * 0.6 * 0.2, rel=1e-6)
+    assert poses[-1, 1, 0] > 0.05
+
+
+def test_a_box_that_tips_over_keeps_its_energy() -> None:
+    """A bar turns about its foot, on a rough table, far from the other box."""
+    rough = dataclasses.replace(BOXES, friction=np.array([5.0, 5.0, 0.0]))
+    tilt, time = 0.3, 0.3
+    radius, corner = np.hypot(0.15, 0.02), np.arctan2(0.02, 0.15)
+    angle = np.pi / 2.0 - tilt  # of the line from the foot to the middle
+    start = np.array(
+        [(radius * np.cos(angle), radius * np.sin(angle), angle - corner), (1.0, 0.025, 0.0)]
+    )
+    poses = simulate(rough, start, np.zeros((2, 3)), time)[:, 0]
+    assert np.hypot(poses[:, 0], poses[:, 1]) == pytest.approx(radius, rel=1e-3)
+    rate = (poses[-1, 2] - poses[-3, 2]) / 0.02
+    height = radius * np.sin(angle) - poses[-2, 1]
+    inertia = (0.15**2 + 0.02**2) * 4.0 / 3.0  # about the foot, of a unit mass
+    assert rate**2 == pytest.approx(2.0 * GRAVITY * height / inertia, rel=0.02)

@@ -17,15 +17,15 @@ from burg_drake.simulation import HandTrial
 # Tests import what they share by name.
 sys.path.insert(0, str(Path(__file__).parent))
 
-from trial_world import BOX, BOX_MASS, POST, QUICK, WIDE, box_mesh, make_station
+from trial_world import BOX, BOX_MASS, PILLAR, POST, QUICK, WIDE, box_mesh, make_station
 
 MakeScene = Callable[..., Scene]
 
 
 @pytest.fixture(scope="session")
 def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Box, block, ball, can, bar, post, wire, card, a box that weighs 20 kg, and one that is too
-    wide for most hands; each stands on its origin, but for a bar that is 0.3 m away from it."""
+    """Box, block, ball, can, bar, post, pillar, wire, card, a box of 20 kg, and one too wide for
+    most hands; each stands on its origin, but for a bar that is 0.3 m away from it."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     ball.apply_translation((0.0, 0.0, 0.03))
     can = trimesh.creation.cylinder(radius=0.03, height=0.1, sections=64)
@@ -45,6 +45,7 @@ def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Pa
         ObjectSource(name="card", mesh=box_mesh((0.0005, 0.06, 0.06)), mass=0.3),
         ObjectSource(name="wide", mesh=box_mesh(WIDE), mass=BOX_MASS),
         ObjectSource(name="post", mesh=box_mesh(POST), mass=0.3),
+        ObjectSource(name="pillar", mesh=box_mesh(PILLAR), mass=0.2),
     ]
     out = tmp_path_factory.mktemp("library")
     assert not build_library(sources, out, confirm=False).failed

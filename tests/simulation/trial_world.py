@@ -33,6 +33,8 @@ WIDE = (0.096, 0.15, 0.10)
 """Size of a box that the Panda's fingers do not fit about [m]."""
 POST = (0.04, 0.04, 0.42)
 """Size of the post [m], which reaches up to an arm's forearm."""
+PILLAR = (0.04, 0.04, 0.13)
+"""Size of the pillar [m], which topples if it is pushed in its upper half."""
 
 
 def lifting(height: float, time: float, **others: float) -> TrialSettings:
