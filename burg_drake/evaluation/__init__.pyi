@@ -72,6 +72,7 @@ from .executor import (
     OnFailure as OnFailure,
     WorkerLimits as WorkerLimits,
     judge_all as judge_all,
+    kept_workers as kept_workers,
 )
 from .feasibility import (
     REACH_MARGIN_COLUMNS as REACH_MARGIN_COLUMNS,
@@ -192,6 +193,7 @@ from .outcome_counts import (
     count_short_lifts as count_short_lifts,
     member_codes as member_codes,
 )
+from .parallel_sampling import samples_in_parallel as samples_in_parallel
 from .part_store import (
     PARTS_FOLDER as PARTS_FOLDER,
     PartWriter as PartWriter,

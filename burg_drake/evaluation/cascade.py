@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import overload
 
@@ -29,13 +30,15 @@ from burg_drake.core import (
     remove_unfinished,
 )
 from burg_drake.evaluation.campaign_folder import Campaign, is_campaign
+from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
 from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
 from burg_drake.evaluation.judge import require_device, starting_note
 from burg_drake.evaluation.many_scenes import evaluate_scenes
+from burg_drake.evaluation.parallel_sampling import ParallelSampling, samples_in_parallel
 from burg_drake.evaluation.part_store import keep_parts
-from burg_drake.evaluation.run_document import WorkSession, add_session, begin_session
+from burg_drake.evaluation.run_document import add_session, begin_session, end_session
 from burg_drake.evaluation.run_folder import RUN_FILE, Run, require_run_folder, save_run
 from burg_drake.evaluation.run_preparation import (
     GraspsLike,
@@ -47,6 +50,7 @@ from burg_drake.evaluation.run_preparation import (
     require_judged,
     require_sound,
     resample_run,
+    save_sampled,
 )
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.evaluation.table_file import require_writer
@@ -149,7 +153,7 @@ def evaluate(
         executor = LocalExecutor.of_this_machine(workers)
         if not (Path(out) / RUN_FILE).exists() and not is_campaign(out):
             require_device(as_engine(settings.engine), settings.device)
-    elif settings.device is not None:
+    elif settings.device is not None and not isinstance(executor, LocalExecutor):
         raise InvalidInputError(
             "device names a card of this machine, but the grasps are judged on a cluster; leave"
             " one of the two out"
@@ -190,61 +194,115 @@ def _evaluate_one(
         require_sound(scene, request)
     ensure_writable_folder(folder)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
-        run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
-        make_judge = request.judge_factory(scene)
+        show_sampling = partial(reporter.show, Progress("sampling"))
+        sample = not samples_in_parallel(scene, request)
+        run = open_run(folder, scene, request, given, show_sampling, sample=sample)
+        call = _SceneCall(run, scene, request, executor, reporter, journal)
         remove_unfinished(folder)
-        retry_failed = request.retry_failed
-        while True:
-            left = open_rows(run, retry_failed=retry_failed)
-            if len(left):
-                job = Job(scene.name, make_judge, run.candidates.at(left))
-                local = isinstance(executor, LocalExecutor)
-                note = starting_note(run.document.engine, request.settings.device) if local else ""
-                session = begin_session(
-                    executor.workers, int(run.index.judged.sum()), request.device_text()
-                )
-                run = _judge_open_grasps(run, left, job, session, journal, executor, reporter, note)
-                require_judged(run)
-                hints = given_hints(run)
-                run = save_run(run.with_document(replace(run.document, hints=hints)))
-            more = next_round(run)
-            if more is None:
-                break
-            reporter.show(Progress("sampling"))
-            run, retry_failed = resample_run(run, more, scene, request.station, before=run), False
-        run = finish_run(run, request.settings.table)
+        if run.is_sampled:
+            call.judge_in_rounds()
+        else:
+            call.judge_while_sampling()
+        run = finish_run(call.run, request.settings.table)
         keep_parts(run)
         return run
 
 
-def _judge_open_grasps(
-    run: Run,
-    left: NDArray[np.int64],
-    job: Job,
-    session: WorkSession,
-    journal: Journal,
-    executor: Executor,
-    reporter: Reporter,
-    note: str,
-) -> Run:
-    """Judges the open grasps, writes each verdict at once, and returns the updated run."""
-    total = len(run.assigned_ids)
-    done = total - len(left)
-    outcomes = run.index.count_outcomes(left)
-    event = Progress(STARTING_PHASE, done, total, outcomes=outcomes, note=note)
-    meter = ProgressMeter(reporter.show, event, "judging")
-    document = run.document
-    save_run(run.with_document(add_session(document, session)))
-    begun = time.monotonic()
-    judged: Counter[str] = Counter()
-    try:
-        with closing(executor.judge([job])) as verdicts:
-            for _, candidate, verdict in verdicts:
-                journal.append(candidate.id, verdict)
-                judged[verdict.device] += 1
-                meter.step(outcome=verdict.outcome)
-    finally:
-        session = session.finish(judged, begun)
-        document = add_session(document, session)
-        run = save_run(Run(run.path, document).with_candidates(run.candidates))
-    return run
+@dataclass
+class _SceneCall:
+    """One call of `evaluate` on one scene; `run` is kept up to date."""
+
+    run: Run
+    scene: Scene
+    request: RunRequest
+    executor: Executor
+    reporter: Reporter
+    journal: Journal
+
+    def judge_in_rounds(self) -> None:
+        """Judges the open grasps, and samples and judges more until the run is balanced."""
+        left = open_rows(self.run, retry_failed=self.request.retry_failed)
+        while True:
+            if len(left):
+                self._judge_rows(left)
+            more = next_round(self.run)
+            if more is None:
+                return
+            self.reporter.show(Progress("sampling"))
+            self.run = resample_run(
+                self.run, more, self.scene, self.request.station, before=self.run
+            )
+            left = open_rows(self.run, retry_failed=False)
+
+    def judge_while_sampling(self) -> None:
+        """Judges the grasps of each instance as soon as they are sampled."""
+        verdicts, retry_failed = self.run.verdicts, self.request.retry_failed
+        known = {id for id, v in verdicts.items() if not v.is_open(retry_failed=retry_failed)}
+        outcomes = Counter(verdicts[id].outcome for id in known)
+        event = Progress(
+            STARTING_PHASE, len(known), self.run.document.grasps.count, outcomes=outcomes
+        )
+        with closing(self._jobs_while_sampling(known)) as jobs:
+            self._judge(jobs, event, len(verdicts))
+        require_judged(self.run)
+
+    def _jobs_while_sampling(self, known: Collection[str]) -> Generator[Job | None, None, None]:
+        """Yields a job for each instance, and writes the grasps once all are sampled.
+
+        Yields None while the next one is not sampled and workers have others to judge.
+        """
+        handed_out = 0
+        with ParallelSampling(self.scene, self.request.station, self.run.document) as sampling:
+            while True:
+                if handed_out > self._judged.total() and not sampling.ready():
+                    yield None
+                    continue
+                part = sampling.next_part()
+                if part is None:
+                    break
+                left = [row for row, id in enumerate(part.id) if id not in known]
+                handed_out += len(left)
+                yield self._job(part.at(left))
+            self.run = save_sampled(self.run, self.scene, sampling.candidates(), sampling.cpu)
+        self._meter.expect(len(self.run.candidates))
+
+    def _judge_rows(self, left: NDArray[np.int64]) -> None:
+        """Judges grasps of the run, given by their rows."""
+        run, total = self.run, len(self.run.assigned_ids)
+        outcomes = run.index.count_outcomes(left)
+        event = Progress(STARTING_PHASE, total - len(left), total, outcomes=outcomes)
+        job = self._job(run.candidates.at(left))
+        self._judge([job], event, int(run.index.judged.sum()))
+        require_judged(self.run)
+        document = replace(self.run.document, hints=given_hints(self.run))
+        self.run = save_run(self.run.with_document(document))
+
+    def _job(self, candidates: Sequence[Candidate]) -> Job:
+        return Job(self.scene.name, self.request.judge_factory(self.scene), candidates)
+
+    def _judge(self, jobs: Iterable[Job | None], event: Progress, before: int) -> None:
+        """Judges the grasps of jobs, writes each verdict at once, and records the session.
+
+        Args:
+            jobs: the jobs.
+            event: first event of progress.
+            before: number of grasps of the run that have a verdict.
+        """
+        request, document = self.request, self.run.document
+        local = isinstance(self.executor, LocalExecutor)
+        note = starting_note(document.engine, request.settings.device) if local else ""
+        self._meter = ProgressMeter(self.reporter.show, replace(event, note=note), "judging")
+        self._judged: Counter[str] = Counter()  # By `Verdict.device`.
+        session = begin_session(self.executor.workers, before, request.device_text())
+        self.run = save_run(self.run.with_document(add_session(document, session)))
+        begun = time.monotonic()
+        try:
+            with closing(self.executor.judge(jobs)) as verdicts:
+                for _, candidate, verdict in verdicts:
+                    self.journal.append(candidate.id, verdict)
+                    self._judged[verdict.device] += 1
+                    self._meter.step(outcome=verdict.outcome)
+        finally:
+            document = end_session(self.run.document, session.finish(self._judged, begun))
+            run = save_run(Run(self.run.path, document))
+            self.run = run.with_candidates(self.run.candidates) if self.run.is_sampled else run

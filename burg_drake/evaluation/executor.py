@@ -22,8 +22,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from queue import SimpleQueue
 from typing import Any, NamedTuple, Protocol
@@ -53,7 +53,7 @@ class Job:
     """Grasps for one judge.
 
     Attributes:
-        key: name of the job, unique in a call.
+        key: name of the judge; jobs with the same key share it.
         make_judge: builds the judge; pickled by reference, see `judge_all`.
         candidates: the grasps.
     """
@@ -606,10 +606,12 @@ class LocalExecutor:
     Attributes:
         workers: number of processes.
         limits: limits of the workers.
+        kept: processes that stay after a call of `judge`; None to start and end them in each call.
     """
 
     workers: int
     limits: WorkerLimits = field(default_factory=WorkerLimits)
+    kept: JudgePool | None = None
 
     def __post_init__(self) -> None:
         worker_count(self.workers)  # refuses what is below 1
@@ -629,8 +631,22 @@ class LocalExecutor:
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `Executor.judge`."""
-        pool = JudgePool(self.workers, self.limits)
+        pool = self.kept or JudgePool(self.workers, self.limits)
         yield from pool.run(jobs, on_failure)
+        if self.kept is None:
+            pool.release()
+
+
+@contextmanager
+def kept_workers(executor: LocalExecutor) -> Iterator[LocalExecutor]:
+    """Context manager that yields an executor whose processes stay until the context ends.
+
+    Jobs of different calls must have different keys, or the same judge.
+    """
+    pool = JudgePool(executor.workers, executor.limits)
+    try:
+        yield replace(executor, kept=pool)
+    finally:
         pool.release()
 
 

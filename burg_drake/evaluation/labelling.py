@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,6 +21,7 @@ from burg_drake.core import (
     MissingDependencyError,
     Pose,
     UnknownNameError,
+    WorkerPool,
     ensure_writable_folder,
     inverse,
     list_names,
@@ -29,14 +32,15 @@ from burg_drake.core import (
 from burg_drake.evaluation.campaign_folder import is_campaign
 from burg_drake.evaluation.candidates import without_instance
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.executor import Executor
+from burg_drake.evaluation.executor import Executor, LocalExecutor, kept_workers
 from burg_drake.evaluation.grasp_sets.input import run_grasps
 from burg_drake.evaluation.judge import require_device
 from burg_drake.evaluation.run_folder import RUN_FILE, Run
 from burg_drake.evaluation.run_preparation import RunRequest
+from burg_drake.evaluation.scene_tasks import PrepareTask, prepare_ahead, preparer_count
 from burg_drake.evaluation.settings import EvaluationSettings
 from burg_drake.evaluation.trial_origin import protocol_of
-from burg_drake.formats import format_named, success_labels
+from burg_drake.formats import GraspFormat, format_named, success_labels
 from burg_drake.objects import LibraryLike, ObjectLibrary, as_library
 from burg_drake.scene import (
     Board,
@@ -135,45 +139,130 @@ def label_library(
         )
     _require_label_folder(folder, names, target.suffixes[0])
     settings = _labelling_settings(settings)
-    RunRequest.of(station, settings)
-    runs = {name: folder / LABELLING_RUNS_FOLDER / name for name in names}
+    request = RunRequest.of(station, settings)
+    scenes = _LabelledScenes(library, station, settings.protocol, folder)
+    runs = {name: scenes.run_folder(name) for name in names}
     new = {name for name, run_folder in runs.items() if not (run_folder / RUN_FILE).exists()}
     if executor is None and new:
         require_device(as_engine(settings.engine), settings.device)
     ensure_writable_folder(folder)
-    for name, run_folder in runs.items():
-        path = folder / LABELLING_SCENES_FOLDER / f"{name}.yaml"
-        try:
-            scene = single_object_scene(library, name, station, settings.protocol, path)
-            if name in new:
-                ensure_writable_folder(path.parent)
-                save_scene(scene.document, path)
-            run = evaluate(
-                scene,
-                station,
-                run_folder,
-                grasps=None if grasps is None else _grasps_of(grasps, name),
-                settings=settings,
-                executor=executor,
-                workers=workers,
-                progress=progress,
-            )
-            found, file = run_grasps(run), folder / f"{name}{target.suffixes[0]}"
-            notes = target.write(found, file, station_gripper(station)) if len(found) else ()
-        except BurgError as error:
-            if _concerns_all(error):
-                raise
-            nothing = np.empty(0)
-            yield ObjectLabels(object=name, success=nothing, given=nothing, error=str(error))
-            continue
-        yield ObjectLabels(
-            object=name,
-            run=run,
-            success=success_labels(found),
-            given=success_labels(run.candidates.grasps),
-            path=file if len(found) else None,
-            notes=(*([] if grasps is None else _pose_notes(grasps, run, name)), *notes),
-        )
+    with ExitStack() as stack:
+        if executor is None:
+            local = LocalExecutor.of_this_machine(workers)
+            executor, workers = stack.enter_context(kept_workers(local)), None
+        request = replace(request, local=isinstance(executor, LocalExecutor))
+        to_sample = [name for name in runs if name in new] if grasps is None else []
+        ahead = stack.enter_context(_SampledAhead(scenes, request, executor.workers, to_sample))
+        for name, run_folder in runs.items():
+            ahead.wait_for(name)
+            given = None if grasps is None else _grasps_of(grasps, name)
+            try:
+                run = evaluate(
+                    scenes.scene(name),
+                    station,
+                    run_folder,
+                    grasps=given,
+                    settings=settings,
+                    executor=executor,
+                    workers=workers,
+                    progress=progress,
+                )
+                found = _write_labels(name, run, target, station, folder)
+            except BurgError as error:
+                if _concerns_all(error):
+                    raise
+                nothing = np.empty(0)
+                found = ObjectLabels(object=name, success=nothing, given=nothing, error=str(error))
+            else:
+                notes = [] if grasps is None else _pose_notes(grasps, run, name)
+                found = replace(found, notes=(*notes, *found.notes))
+            yield found
+
+
+def _write_labels(
+    name: str, run: Run, target: GraspFormat, station: Station, folder: Path
+) -> ObjectLabels:
+    """Writes the grasps of an object's run with their labels."""
+    found, file = run_grasps(run), folder / f"{name}{target.suffixes[0]}"
+    notes = target.write(found, file, station_gripper(station)) if len(found) else ()
+    return ObjectLabels(
+        object=name,
+        run=run,
+        success=success_labels(found),
+        given=success_labels(run.candidates.grasps),
+        path=file if len(found) else None,
+        notes=tuple(notes),
+    )
+
+
+@dataclass(frozen=True)
+class _LabelledScenes:
+    """Scenes of single objects, and the folders of their runs, in the folder of the labels."""
+
+    library: ObjectLibrary
+    station: Station
+    protocol: TrialProtocol
+    folder: Path
+
+    def run_folder(self, name: str) -> Path:
+        """Folder of the run of an object."""
+        return self.folder / LABELLING_RUNS_FOLDER / name
+
+    def scene(self, name: str) -> Scene:
+        """The scene of an object, whose file is written for a new run.
+
+        Raises:
+            InvalidInputError: see `single_object_scene`.
+        """
+        path = self.folder / LABELLING_SCENES_FOLDER / f"{name}.yaml"
+        scene = single_object_scene(self.library, name, self.station, self.protocol, path)
+        if not (self.run_folder(name) / RUN_FILE).exists():
+            ensure_writable_folder(path.parent)
+            save_scene(scene.document, path)
+        return scene
+
+
+class _SampledAhead:
+    """Samples grasps of objects while those of others are judged; a context that ends the
+    processes."""
+
+    def __init__(
+        self, scenes: _LabelledScenes, request: RunRequest, workers: int, names: Sequence[str]
+    ) -> None:
+        """Sets up the processes, which start when `wait_for` is called.
+
+        Args:
+            scenes: scenes of the objects.
+            request: the request for all scenes.
+            workers: number of workers that judge.
+            names: objects with new runs, in the order in which they are waited for.
+        """
+        self._scenes, self._begun = scenes, deque[str]()
+        count = preparer_count(workers, request.engine)
+        self._pool = WorkerPool(count, retries=0, own_group=True)
+        has_others = len(names) > 1 and (workers > 1 or request.engine.parallel)
+        tasks = self._tasks(names if has_others else ())
+        self._prepared = prepare_ahead(self._pool, request, tasks)
+
+    def _tasks(self, names: Sequence[str]) -> Iterator[PrepareTask]:
+        for name in names:
+            with suppress(BurgError):  # raised again when its turn comes
+                scene = self._scenes.scene(name)
+                self._begun.append(name)
+                yield PrepareTask(name, self._scenes.run_folder(name), scene)
+
+    def wait_for(self, name: str) -> None:
+        """Waits until the run of an object is sampled, if it was begun; errors come later."""
+        self._prepared.ready()  # begins more
+        if self._begun and self._begun[0] == name:
+            self._begun.popleft()
+            self._prepared.take()
+
+    def __enter__(self) -> _SampledAhead:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._pool.kill_workers()
 
 
 def _concerns_all(error: BurgError) -> bool:

@@ -295,6 +295,11 @@ def add_session(document: OneRunDocument, session: WorkSession) -> OneRunDocumen
     return replace(document, stretches=(*document.stretches, session))
 
 
+def end_session(document: OneRunDocument, session: WorkSession) -> OneRunDocument:
+    """The document with its last session, which has ended, in place of the one that began."""
+    return replace(document, stretches=(*document.stretches[:-1], session))
+
+
 def begin_session(workers: int, before: int, device: str = "") -> WorkSession:
     """A session that begins now; `before` is the number of grasps that have a verdict."""
     started = datetime.now(UTC).isoformat(timespec="seconds")

@@ -98,9 +98,23 @@ class Run:
         judged = len({id for _, id, _ in journal_lines(self.path / JOURNAL_FILE)})
         return f"Run({str(self.path)!r}, scene {scene!r}, {judged} of {count} grasps judged)"
 
+    @property
+    def is_sampled(self) -> bool:
+        """Whether all grasps are known; not so while a run samples some and judges others."""
+        return bool(self.document.grasps.content)
+
     @cached_property
     def candidates(self) -> Candidates:
-        """All grasps of the run."""
+        """All grasps of the run.
+
+        Raises:
+            InvalidInputError: the run was stopped, or is, while its grasps are sampled.
+        """
+        if not self.is_sampled:
+            raise InvalidInputError(
+                f"the grasps of {self.path} are not all sampled yet; wait for the process that"
+                " evaluates it, or run the same command again to continue"
+            )
         return Candidates.load(self.path / GRASPS_FILE)
 
     @cached_property
@@ -386,18 +400,23 @@ def load_run(path: str | Path) -> Run:
 
 
 def create_run(
-    folder: Path, document: RunDocument, scene: Scene, station: Station, candidates: Candidates
+    folder: Path,
+    document: RunDocument,
+    scene: Scene,
+    station: Station,
+    candidates: Candidates | None = None,
 ) -> Run:
     """Writes a new run without results.
 
-    Writes the candidates first, then run.yaml, which makes the folder a run, then the copies of
-    scene and station; see `require_run_folder`.
+    Writes the candidates first, if they are known, then run.yaml, which makes the folder a run,
+    then the copies of scene and station; see `require_run_folder`.
 
     Raises:
         InvalidInputError: the folder cannot be written.
     """
     ensure_writable_folder(folder)
-    candidates.save(folder / GRASPS_FILE)
+    if candidates is not None:
+        candidates.save(folder / GRASPS_FILE)
     run = save_run(Run(folder, document))
     write_copies(folder, scene, station)
     return run

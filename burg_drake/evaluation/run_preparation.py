@@ -12,8 +12,8 @@ import shlex
 import sys
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,6 +97,12 @@ A function may have attributes `content`, a hash of the source of its grasps, an
 correction that it applies to them."""
 
 
+def current_command() -> str:
+    """Command line of this process, quoted for a shell."""
+    program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
+    return shlex.join([program, *sys.argv[1:]])
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunRequest:
     """A request to `evaluate`, for one scene or for many.
@@ -109,6 +115,7 @@ class RunRequest:
         grasps: grasps given by the user; None to sample.
         retry_failed: whether to retry grasps that could not be simulated.
         local: whether this machine judges, and not a cluster.
+        command: command line of the process that makes the request; others may prepare its runs.
     """
 
     station: Station
@@ -121,6 +128,7 @@ class RunRequest:
     grasps: GraspsLike | None
     retry_failed: bool
     local: bool = True
+    command: str = field(default_factory=current_command)
 
     @classmethod
     def of(
@@ -277,7 +285,7 @@ class RunRequest:
     def document_fields(self) -> dict[str, Any]:
         """Fields of a run's document that do not depend on the scene."""
         return {
-            "command": current_command(),
+            "command": self.command,
             "station": input_of(self.station, "stations"),
             "engine": self.engine,
             "protocol": self.settings.protocol,
@@ -334,12 +342,6 @@ class RunRequest:
         )
 
 
-def current_command() -> str:
-    """Command line of this process, quoted for a shell."""
-    program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
-    return shlex.join([program, *sys.argv[1:]])
-
-
 def given_content(grasps: GraspsLike | None) -> str:
     """Hash of the grasps given for many scenes.
 
@@ -380,13 +382,34 @@ def sample_requested(
         before: the run with the grasps so far; objects whose number of grasps does not change keep
             their grasps. None to sample all.
     """
+    names = instances_to_sample(scene, document)
+    kept = {} if before is None else _unchanged_grasps(scene, before, document.grasps)
+    new = [name for name in names if name not in kept]
+    found = {**kept, **sample_instances(scene, station, document, new)}
+    return join_candidates({name: found[name] for name in names})
+
+
+def instances_to_sample(scene: Scene, document: RunDocument) -> tuple[str, ...]:
+    """Names of the instances of which a run samples grasps, in the order of its candidates."""
+    return document.grasps.only or tuple(scene.instances)
+
+
+def sample_instances(
+    scene: Scene, station: Station, document: RunDocument, names: Sequence[str]
+) -> dict[str, GraspSet]:
+    """Samples the grasps that a run's document asks for on some instances.
+
+    They do not depend on which other instances are named.
+
+    Args:
+        scene, station, document: see `sample_requested`.
+        names: names of the instances.
+    """
     grasps = document.grasps
-    names = grasps.only or tuple(scene.instances)
-    kept = {} if before is None else _unchanged_grasps(scene, before, grasps)
-    found: defaultdict[str, list[GraspSet]] = defaultdict(list, kept)
+    found: defaultdict[str, list[GraspSet]] = defaultdict(list)
     for slippery in (False, True):
         by_count: defaultdict[int, list[str]] = defaultdict(list)
-        for name in (name for name in names if name not in kept):
+        for name in names:
             by_count[_requested_counts(grasps, scene.instance(name).object)[slippery]].append(name)
         for count, instances in sorted(by_count.items()):
             if count:
@@ -398,10 +421,10 @@ def sample_requested(
                 sampled = sample_on_scene(scene, station, count, document.seed, settings, instances)
                 for name, part in sampled:
                     found[name].append(part)
-    return join_candidates({name: _join_sets(found[name]) for name in names})
+    return {name: _join_sets(found[name]) for name in names}
 
 
-def _unchanged_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, list[GraspSet]]:
+def _unchanged_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, GraspSet]:
     """Grasps of the instances whose requested number has not changed, by instance."""
     candidates = before.candidates
     provenance = candidates.grasps.provenance["parts"]
@@ -410,7 +433,7 @@ def _unchanged_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, li
         object = scene.instance(name).object
         if _requested_counts(grasps, object) == _requested_counts(before.document.grasps, object):
             own = candidates.grasps.select(candidates.instance == name)
-            kept[name] = [replace(own, provenance=provenance[name])]
+            kept[name] = replace(own, provenance=provenance[name])
     return kept
 
 
@@ -479,6 +502,8 @@ def open_run(
     request: RunRequest,
     given: Candidates | None,
     before_sampling: Callable[[], None] = lambda: None,
+    *,
+    sample: bool = True,
 ) -> Run:
     """Continues the run in a folder, or begins a new one there.
 
@@ -488,6 +513,7 @@ def open_run(
         request: the request for the scene.
         given: the user's grasps; None to sample.
         before_sampling: called before grasps are sampled.
+        sample: whether to sample grasps; if not, the run may return without, see `Run.is_sampled`.
 
     Raises:
         InvalidInputError: the folder holds another run.
@@ -500,10 +526,15 @@ def open_run(
         run = load_run(folder)
         require_same_run(folder, run.document, document)
         write_copies(folder, scene, request.station)
+        if not run.is_sampled:  # killed while it sampled
+            before_sampling()
+            return resample_run(run, run.document, scene, request.station) if sample else run
         if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
             # killed after the grasps of a round were written, but before run.yaml
             return resample_run(run, run.document, scene, request.station)
         return run
+    if candidates is None and not sample:
+        return create_run(folder, _expect_grasps(document, scene), scene, request.station)
     if candidates is None:
         before_sampling()
         start = time.process_time()
@@ -525,15 +556,32 @@ def resample_run(
     start = time.process_time()
     candidates = sample_requested(scene, station, document, before)
     cpu = document.grasps.cpu + time.process_time() - start
-    document = _record_grasps(document, scene, candidates, cpu)
+    return save_sampled(Run(run.path, document), scene, candidates, cpu)
+
+
+def save_sampled(run: Run, scene: Scene, candidates: Candidates, cpu: float) -> Run:
+    """Writes sampled grasps of a run, then its document, with the CPU time of sampling [s]."""
+    document = _record_grasps(run.document, scene, candidates, cpu)
     candidates.save(run.path / GRASPS_FILE)
-    return save_run(Run(run.path, replace(document, hash=run_hash(document))))
+    document = replace(document, hash=run_hash(document))
+    return save_run(Run(run.path, document).with_candidates(candidates))
+
+
+def _expect_grasps(document: RunDocument, scene: Scene) -> RunDocument:
+    """The document of a run before its grasps are sampled, with the numbers that are expected."""
+    each = document.grasps.per_object or 0
+    names = instances_to_sample(scene, document)
+    objects: Counter[str] = Counter()
+    for name in names:
+        objects[scene.instance(name).object] += each
+    grasps = replace(document.grasps, count=each * len(names), objects=dict(objects))
+    return replace(document, grasps=grasps)
 
 
 def _record_grasps(
     document: RunDocument, scene: Scene, candidates: Candidates, cpu: float
 ) -> RunDocument:
-    names = document.grasps.only or scene.instances
+    names = instances_to_sample(scene, document)
     counts = Counter({scene.instance(name).object: 0 for name in names})
     for name, count in candidates.counts.items():
         counts[scene.instance(name).object] += count

@@ -47,6 +47,7 @@ from burg_drake.evaluation.run_preparation import (
 from burg_drake.evaluation.run_summary import run_shortfall_notes
 from burg_drake.evaluation.settings import TableFormat
 from burg_drake.scene import Scene, as_scene
+from burg_drake.station import Engine
 
 
 class SceneJudging:
@@ -259,11 +260,19 @@ class SceneResultsWriter:
         return self._writer
 
 
-def preparer_count(workers: int) -> int:
-    """Number of processes that prepare scenes."""
-    # One for 16 workers, as sampling takes about a thirtieth of the time of the trials. At least
-    # one, as a cluster may have no workers yet.
-    return max(1, -(-workers // 16))
+def preparer_count(workers: int, engine: Engine) -> int:
+    """Number of processes that prepare scenes for so many workers that judge."""
+    # One for 16 workers, as sampling takes about a thirtieth of the time of the trials; but longer
+    # than trials on a card. At least one, as a cluster may have no workers yet.
+    return max(1, -(-workers // (2 if engine.parallel else 16)))
+
+
+def prepare_ahead(
+    pool: WorkerPool, request: RunRequest, work: Iterable[PrepareTask]
+) -> Prefetcher[PrepareTask, Scene | None]:
+    """Prepares runs of scenes ahead of their use, in the given order; see `Preparer`."""
+    session = Session("prepare", partial(Preparer, request))
+    return Prefetcher(pool, work, lambda item: Task(Preparer.__call__, (item,), session=session))
 
 
 class SceneProcesses:
@@ -278,7 +287,8 @@ class SceneProcesses:
             workers: number of workers that judge.
         """
         self._pools: list[WorkerPool] = []
-        self._request, self._preparers = request, self._add_pool(preparer_count(workers))
+        count = preparer_count(workers, request.engine)
+        self._request, self._preparers = request, self._add_pool(count)
         self._finisher = self._add_pool(1)
         self._finishing: deque[tuple[FinishTask | None, WorkerFuture[None]]] = deque()
         self._session = Session("finish", partial(SceneResultsWriter, outputs))
@@ -288,12 +298,7 @@ class SceneProcesses:
 
     def prepare(self, work: Iterable[PrepareTask]) -> None:
         """Starts preparing scenes, in the given order."""
-        session = Session("prepare", partial(Preparer, self._request))
-        self._prefetcher: Prefetcher[PrepareTask, Scene | None] = Prefetcher(
-            self._preparers,
-            iter(work),
-            lambda item: Task(Preparer.__call__, (item,), session=session),
-        )
+        self._prefetcher = prepare_ahead(self._preparers, self._request, work)
 
     def ready(self) -> bool:
         """Whether `next_prepared` returns at once."""

@@ -94,8 +94,9 @@ class RunWatch:
         status = self._make_status(
             result.path / JOURNAL_FILE, judged, total, counts.outcomes, counts.modified
         )
-        under_way = () if judged == total else (document.scene.name,)
-        return replace(status, kind="run", done=int(judged == total), under_way=under_way)
+        done = judged == total and result.is_sampled
+        under_way = () if done else (document.scene.name,)
+        return replace(status, kind="run", done=int(done), under_way=under_way)
 
     def _look_at_scenes(self, campaign: Campaign) -> Status:
         states = {name: s for name, s in campaign.states.items() if name in set(campaign.names)}

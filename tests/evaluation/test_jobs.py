@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from burg_drake.evaluation import (
     LocalExecutor,
     StationJudgeFactory,
     WorkerLimits,
+    kept_workers,
 )
 from burg_drake.station import ENGINES
 
@@ -55,6 +57,18 @@ def test_jobs_share_the_processes_and_each_judge_is_built_once(
     if workers == 1:
         assert [name for name, _ in built] == ["a", "b", "c", "d"]
     assert len({process for _, process in built}) == workers
+
+
+@pytest.mark.parametrize("kept", [False, True])
+def test_processes_stay_for_the_next_call_where_they_are_kept(tmp_path: Path, kept: bool) -> None:
+    log, executor = tmp_path / "built", LocalExecutor(1)
+    with kept_workers(executor) if kept else nullcontext(executor) as executor:
+        for name in ("a", "b", "a"):
+            job = Job(name, MakeAndTell(KnownJudge(), log, name), grasps(name, 3))
+            assert len(list(executor.judge([job]))) == 3
+    built = [line.split() for line in log.read_text().splitlines()]
+    assert [name for name, _ in built] == (["a", "b"] if kept else ["a", "b", "a"])
+    assert len({process for _, process in built}) == (1 if kept else 3)
 
 
 def test_jobs_are_asked_for_when_they_are_needed() -> None:

@@ -123,6 +123,27 @@ def test_the_same_call_goes_on_where_it_stopped(
     assert (out / "scenes" / "cube.yaml").read_text() == scene
 
 
+def test_grasps_of_the_next_objects_are_sampled_by_other_processes(
+    labelled: list[ObjectLabels],
+    library: ObjectLibrary,
+    station: Station,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Their runs are as if this process had made them, and errors are told in their turn."""
+    monkeypatch.setattr("sys.argv", ["label", "me"])
+    place = "burg_drake.evaluation.run_preparation.sample_requested"
+    monkeypatch.setattr(place, lambda *_: pytest.fail("sampled here"))
+    found = list(
+        label_library(library, station, tmp_path, settings=SETTINGS, workers=2, progress=False)
+    )
+    assert [each.error for each in found] == [each.error for each in labelled]
+    for each, expected in zip(found[:2], labelled, strict=False):
+        assert each.run.document.hash == expected.run.document.hash
+        np.testing.assert_array_equal(each.success, expected.success)
+        assert each.run.document.command == "label me"
+
+
 def test_errors_of_an_object_do_not_stop_the_others_and_those_of_the_machine_do(
     library: ObjectLibrary,
     station: Station,
