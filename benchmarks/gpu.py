@@ -13,9 +13,9 @@ first batch, a small one, compiles the kernels, and is not counted. `--grasps 0`
 out.
 
 At last `burg.evaluate` judges N grasps of the objects by P worker processes, from sampling to the
-report: grasps a second of the whole call, the share of time by phase (opening, sampling, judging,
-writing), and the largest memory of this process and of a worker. Judging includes the start of the
-workers and the screens. N is small on the CPU device, where it is a try; 0 leaves it out.
+report: grasps a second of the whole call, the share of time by phase (opening, judging, writing),
+the CPU time of sampling, which processes beside do, and the largest memory of this process and of a
+worker. Judging includes the start of the workers and the screens. N is small on the CPU device, where it is a try; 0 leaves it out.
 """
 
 from __future__ import annotations
@@ -64,7 +64,10 @@ def main() -> None:
     arguments = parser.parse_args()
     scene = burg.load_scene(arguments.scene)
     station = hand_only(burg.load_station(arguments.station))
-    batch = BatchTrial(scene, station, device=arguments.device)
+    try:
+        batch = BatchTrial(scene, station, device=arguments.device)
+    except burg.BurgError as error:  # there is no card
+        parser.error(str(error))
     print(f"{batch.device}, MuJoCo Warp {version('mujoco-warp')}, Warp {wp.__version__}")
     if arguments.grasps:
         measure_batches(batch, arguments)
@@ -186,6 +189,7 @@ def measure_run(
         )
         phases.begin("")
         judged, executed = len(run.candidates), run.document.stretches[-1].executed
+        sampling = run.document.grasps.cpu
     total = sum(phases.times.values())
     shares = (f"{name} {100.0 * spent / total:.0f} %" for name, spent in phases.times.items())
     own, largest = (
@@ -194,7 +198,8 @@ def measure_run(
     )
     print(
         f"evaluate, {workers} workers: {judged} grasps, {sum(executed.values())} of them executed,"
-        f" in {total:.1f} s: {judged / total:.1f} a second; {', '.join(shares)}; memory"
+        f" in {total:.1f} s: {judged / total:.1f} a second; {', '.join(shares)};"
+        f" sampled in {sampling:.1f} s of CPU time; memory"
         f" {own:.1f} GiB, of a worker at most {largest:.1f} GiB"
     )
 

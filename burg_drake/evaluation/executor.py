@@ -601,17 +601,16 @@ class Executor(Protocol):
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Judges in worker processes of this machine.
+    """Judges in worker processes of this machine, which end with each call.
 
     Attributes:
         workers: number of processes.
         limits: limits of the workers.
-        kept: processes that stay after a call of `judge`; None to start and end them in each call.
     """
 
     workers: int
     limits: WorkerLimits = field(default_factory=WorkerLimits)
-    kept: JudgePool | None = None
+    _kept: JudgePool | None = field(default=None, repr=False)  # See `kept_workers`.
 
     def __post_init__(self) -> None:
         worker_count(self.workers)  # refuses what is below 1
@@ -631,9 +630,9 @@ class LocalExecutor:
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
     ) -> Generator[tuple[Job, Candidate, Verdict], None, None]:
         """See `Executor.judge`."""
-        pool = self.kept or JudgePool(self.workers, self.limits)
+        pool = self._kept or JudgePool(self.workers, self.limits)
         yield from pool.run(jobs, on_failure)
-        if self.kept is None:
+        if self._kept is None:
             pool.release()
 
 
@@ -645,7 +644,7 @@ def kept_workers(executor: LocalExecutor) -> Iterator[LocalExecutor]:
     """
     pool = JudgePool(executor.workers, executor.limits)
     try:
-        yield replace(executor, kept=pool)
+        yield replace(executor, _kept=pool)
     finally:
         pool.release()
 
