@@ -112,6 +112,10 @@ class HandLiftClearance(_LiftClearance):
         self._swept = self._swept_boxes()
         start = target.floating_positions_start() + 4
         self._translations = [start, start + 1, start + 2, self._hand.lift.position_start()]
+        others = set(station_diagram.free.values()) - {self._index}
+        begins = sorted(self._plant.get_body(i).floating_positions_start() for i in others)
+        self._other_positions = [k for begin in begins for k in range(begin, begin + 7)]
+        self._other_bounds: tuple[bytes, tuple[Array, Array]] | None = None
 
     def is_free(self, world: PlacedRobot, X_WG: Array, length: float, direction_W: Array) -> bool:
         """Whether the path is free of collisions.
@@ -181,10 +185,11 @@ class HandLiftClearance(_LiftClearance):
     def _near_others(self, p_W: Array) -> tuple[float, float]:
         """Part of a displacement (3,), from 0 to 1, outside which the world-aligned bounding boxes
         of the moving geometries are apart from those of all others; (inf, -inf) if always."""
-        (low, high), (other_low, other_high) = (
-            (corners[0] for corners in self._placed_boxes(boxes).bounds(np.eye(4)[None]))
-            for boxes in (self._carried_boxes, self._other_boxes)
-        )
+        low, high = self._bounds(self._carried_boxes)
+        q = self._plant.GetPositions(self._plant_context)[self._other_positions].tobytes()
+        if self._other_bounds is None or self._other_bounds[0] != q:  # they have moved
+            self._other_bounds = q, self._bounds(self._other_boxes)
+        other_low, other_high = self._other_bounds[1]
         p_W = np.where(np.abs(p_W) < 1e-12, 1e-12, p_W)  # Divides by it; far below the gap.
         enter = (other_low[None] - MIN_BOX_GAP - high[:, None]) / p_W
         leave = (other_high[None] + MIN_BOX_GAP - low[:, None]) / p_W
@@ -193,6 +198,11 @@ class HandLiftClearance(_LiftClearance):
         near = first <= last
         begin, end = first.min(where=near, initial=np.inf), last.max(where=near, initial=-np.inf)
         return float(begin), float(end)
+
+    def _bounds(self, boxes: list[GeometryBox]) -> tuple[Array, Array]:
+        """Lower and upper corners (M, 3) of world-aligned bounding boxes of geometries."""
+        low, high = self._placed_boxes(boxes).bounds(np.eye(4)[None])
+        return low[0], high[0]
 
     def _boxes(self, geometries: list[GeometryId]) -> list[GeometryBox]:
         inspector = self._query().inspector()
