@@ -527,8 +527,10 @@ def open_run(
         require_same_run(folder, run.document, document)
         write_copies(folder, scene, request.station)
         if not run.is_sampled:  # killed while it sampled
+            if not sample:
+                return run
             before_sampling()
-            return resample_run(run, run.document, scene, request.station) if sample else run
+            return resample_run(run, run.document, scene, request.station)
         if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
             # killed after the grasps of a round were written, but before run.yaml
             return resample_run(run, run.document, scene, request.station)
