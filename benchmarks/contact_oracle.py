@@ -19,7 +19,7 @@ as that of Drake diagrams outside of trials, and with pads of twice the damping.
 changes, the grasp hinges on what neither method knows of the world; the list says so.
 
 `--converge` has the oracle judge the grasps at half the step and with twice as many samples, too:
-of 72 hard cases no verdict changes, and of 599 of strangers one at half the step.
+of 72 hard cases no verdict changes, and of those of `--strangers` one at half the step.
 
 FOLDER keeps the library and a journal (trials.jsonl): a run that was interrupted goes on where it
 was. After a change of contact geometry or engine take a new folder.

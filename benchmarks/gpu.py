@@ -14,9 +14,9 @@ out.
 
 At last `burg.evaluate` judges N grasps of the objects by P worker processes, from sampling to the
 report: grasps a second of the whole call, the share of time by phase (opening, judging, writing),
-the CPU time of sampling, which processes beside do, and the largest memory of this process and of a
-worker. Judging includes the start of the workers and the screens. N is small on the CPU device,
-where it is a try; 0 leaves it out.
+the CPU time of the sampling processes, and the largest memory of this process and of a worker.
+Judging includes the start of the workers and the screens. N is small on the CPU device, where it is
+a try; 0 leaves it out.
 """
 
 from __future__ import annotations

@@ -72,7 +72,7 @@ from .executor import (
     OnFailure as OnFailure,
     WorkerLimits as WorkerLimits,
     judge_all as judge_all,
-    kept_workers as kept_workers,
+    keep_workers as keep_workers,
 )
 from .feasibility import (
     REACH_MARGIN_COLUMNS as REACH_MARGIN_COLUMNS,

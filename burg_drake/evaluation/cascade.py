@@ -11,7 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import overload
@@ -23,9 +23,11 @@ from burg_drake.core import (
     STARTING_PHASE,
     InvalidInputError,
     Listener,
+    Outcome,
     Progress,
     ProgressMeter,
     Reporter,
+    SimulationError,
     ensure_writable_folder,
     remove_unfinished,
 )
@@ -33,10 +35,14 @@ from burg_drake.evaluation.campaign_folder import Campaign, is_campaign
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
 from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
-from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, journal_lines
 from burg_drake.evaluation.judge import require_device, starting_note
 from burg_drake.evaluation.many_scenes import evaluate_scenes
-from burg_drake.evaluation.parallel_sampling import ParallelSampling, samples_in_parallel
+from burg_drake.evaluation.parallel_sampling import (
+    InstanceSampler,
+    ParallelSampling,
+    samples_in_parallel,
+)
 from burg_drake.evaluation.part_store import keep_parts
 from burg_drake.evaluation.run_document import add_session, begin_session, end_session
 from burg_drake.evaluation.run_folder import RUN_FILE, Run, require_run_folder, save_run
@@ -149,19 +155,10 @@ def evaluate(
     """
     settings = settings or EvaluationSettings()
     station = as_station(station)
-    if executor is None:
-        executor = LocalExecutor.of_this_machine(workers)
-        if not (Path(out) / RUN_FILE).exists() and not is_campaign(out):
-            require_device(as_engine(settings.engine), settings.device)
-    elif settings.device is not None and not isinstance(executor, LocalExecutor):
-        raise InvalidInputError(
-            "device names a card of this machine, but the grasps are judged on a cluster; leave"
-            " one of the two out"
-        ).about("device")
-    elif workers is not None:
-        raise InvalidInputError(
-            "give either workers or an executor; an executor has workers of its own"
-        )
+    executor = executor_for(executor, workers, settings)
+    is_new = not (Path(out) / RUN_FILE).exists() and not is_campaign(out)
+    if isinstance(executor, LocalExecutor) and is_new:
+        require_device(as_engine(settings.engine), settings.device)
     if settings.until_balanced is not None and grasps is not None:
         raise InvalidInputError(
             "until_balanced samples more grasps, but grasps are given; leave out one of the two"
@@ -177,6 +174,29 @@ def evaluate(
             " evaluate each by itself: `trials plan` takes the runs together"
         ).about("until_balanced")
     return evaluate_scenes(scene, request, Path(out), executor, progress)
+
+
+def executor_for(
+    executor: Executor | None, workers: int | None, settings: EvaluationSettings
+) -> Executor:
+    """The given executor, or one with this number of processes.
+
+    Raises:
+        InvalidInputError: both are given, the number is below 1, or the settings name a device of
+            this machine for another executor.
+    """
+    if executor is None:
+        return LocalExecutor.of_this_machine(workers)
+    if workers is not None:
+        raise InvalidInputError(
+            "give either workers or an executor; an executor has workers of its own"
+        )
+    if settings.device is not None and not isinstance(executor, LocalExecutor):
+        raise InvalidInputError(
+            "device names a card of this machine, but the grasps are judged on a cluster; leave"
+            " one of the two out"
+        ).about("device")
+    return executor
 
 
 def _evaluate_one(
@@ -218,6 +238,11 @@ class _SceneCall:
     executor: Executor
     reporter: Reporter
     journal: Journal
+    _meter: ProgressMeter = field(init=False)
+    _judged: Counter[str] = field(init=False)  # Grasps judged in this session, by their device.
+
+    def __post_init__(self) -> None:
+        self._make_judge = self.request.judge_factory(self.scene)
 
     def judge_in_rounds(self) -> None:
         """Judges the open grasps, and samples and judges more until the run is balanced."""
@@ -236,14 +261,22 @@ class _SceneCall:
 
     def judge_while_sampling(self) -> None:
         """Judges the grasps of each instance as soon as they are sampled."""
-        verdicts, retry_failed = self.run.verdicts, self.request.retry_failed
-        known = {id for id, v in verdicts.items() if not v.is_open(retry_failed=retry_failed)}
-        outcomes = Counter(verdicts[id].outcome for id in known)
+        known: dict[str, Outcome] = {}
+        for _, id, verdict in journal_lines(self.run.path / JOURNAL_FILE):
+            known[id] = verdict.outcome
+            if verdict.is_open(retry_failed=self.request.retry_failed):
+                del known[id]
+        outcomes = Counter(known.values())
         event = Progress(
             STARTING_PHASE, len(known), self.run.document.grasps.count, outcomes=outcomes
         )
         with closing(self._jobs_while_sampling(known)) as jobs:
-            self._judge(jobs, event, len(verdicts))
+            self._judge(jobs, event, len(known))
+        if not self.run.is_sampled:
+            raise SimulationError(
+                f"the executor of {self.run.path} ended before all grasps were judged; the results"
+                " so far are kept: run the same command to continue"
+            )
         require_judged(self.run)
 
     def _jobs_while_sampling(self, known: Collection[str]) -> Generator[Job | None, None, None]:
@@ -252,7 +285,8 @@ class _SceneCall:
         Yields None while the next one is not sampled and workers have others to judge.
         """
         handed_out = 0
-        with ParallelSampling(self.scene, self.request.station, self.run.document) as sampling:
+        sampler = InstanceSampler(self.scene, self.request.station, self.run.document)
+        with ParallelSampling(sampler, self.executor.workers) as sampling:
             while True:
                 if handed_out > self._judged.total() and not sampling.ready():
                     yield None
@@ -278,7 +312,7 @@ class _SceneCall:
         self.run = save_run(self.run.with_document(document))
 
     def _job(self, candidates: Sequence[Candidate]) -> Job:
-        return Job(self.scene.name, self.request.judge_factory(self.scene), candidates)
+        return Job(self.scene.name, self._make_judge, candidates)
 
     def _judge(self, jobs: Iterable[Job | None], event: Progress, before: int) -> None:
         """Judges the grasps of jobs, writes each verdict at once, and records the session.
@@ -292,7 +326,7 @@ class _SceneCall:
         local = isinstance(self.executor, LocalExecutor)
         note = starting_note(document.engine, request.settings.device) if local else ""
         self._meter = ProgressMeter(self.reporter.show, replace(event, note=note), "judging")
-        self._judged: Counter[str] = Counter()  # By `Verdict.device`.
+        self._judged = Counter()
         session = begin_session(self.executor.workers, before, request.device_text())
         self.run = save_run(self.run.with_document(add_session(document, session)))
         begun = time.monotonic()

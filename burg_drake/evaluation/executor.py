@@ -25,7 +25,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import Any, NamedTuple, Protocol
 
 from burg_drake.core import (
@@ -351,6 +351,7 @@ class JudgePool:
         self._screens: dict[str, tuple[ScreenSize, ...]] = {}
         self._remaining_jobs: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
+        self._job_is_pending = False
 
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None
@@ -359,6 +360,7 @@ class JudgePool:
 
         Idle workers stay for another call; an error or closing the generator ends all workers.
         """
+        job_poll = 0.2  # Seconds after which a job that was not ready is asked for again.
         self._remaining_jobs, self._on_failure = iter(jobs), on_failure
         self.create_workers()
         try:
@@ -366,9 +368,13 @@ class JudgePool:
                 self.assign_work()
                 if not any(slot.assigned for slot in self.slots):
                     break
-                work = self._done.get()
-                if self.stopped:
-                    raise SimulationError("the worker processes were stopped")
+                try:
+                    work = self._done.get(timeout=job_poll if self._job_is_pending else None)
+                except Empty:
+                    continue
+                finally:
+                    if self.stopped:
+                        raise SimulationError("the worker processes were stopped")
                 work.slot.assigned.remove(work)
                 if not work.job.failed:
                     yield from self.handle_result(work)
@@ -385,6 +391,7 @@ class JudgePool:
 
     def assign_work(self) -> None:
         """Gives work to idle workers, first to those whose process has started."""
+        self._job_is_pending = False
         usable = [slot for slot in self.slots if not slot.device_failed]
         for slot in sorted(usable, key=lambda slot: not slot.started):
             if not slot.assigned and (job := self.choose_job(slot)) is not None:
@@ -402,7 +409,8 @@ class JudgePool:
         if slot.job is not None and slot.job.waiting:
             return slot.job
         for job in self._remaining_jobs:
-            if job is None:  # none is ready yet; asked again when something has happened
+            if job is None:  # none is ready yet
+                self._job_is_pending = True
                 break
             if job.candidates:
                 self.jobs.append(OpenJob(job, self.limits))
@@ -601,7 +609,7 @@ class Executor(Protocol):
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Judges in worker processes of this machine, which end with each call.
+    """Judges in worker processes of this machine.
 
     Attributes:
         workers: number of processes.
@@ -610,7 +618,7 @@ class LocalExecutor:
 
     workers: int
     limits: WorkerLimits = field(default_factory=WorkerLimits)
-    _kept: JudgePool | None = field(default=None, repr=False)  # See `kept_workers`.
+    _kept: JudgePool | None = field(default=None, repr=False)  # See `keep_workers`.
 
     def __post_init__(self) -> None:
         worker_count(self.workers)  # refuses what is below 1
@@ -637,10 +645,11 @@ class LocalExecutor:
 
 
 @contextmanager
-def kept_workers(executor: LocalExecutor) -> Iterator[LocalExecutor]:
+def keep_workers(executor: LocalExecutor) -> Iterator[LocalExecutor]:
     """Context manager that yields an executor whose processes stay until the context ends.
 
-    Jobs of different calls must have different keys, or the same judge.
+    It is for one call at a time. Jobs of different calls must have different keys, or the same
+    judge.
     """
     pool = JudgePool(executor.workers, executor.limits)
     try:

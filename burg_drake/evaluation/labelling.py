@@ -20,7 +20,11 @@ from burg_drake.core import (
     Listener,
     MissingDependencyError,
     Pose,
+    Progress,
+    Reporter,
+    SimulationError,
     UnknownNameError,
+    WorkerDied,
     WorkerPool,
     ensure_writable_folder,
     inverse,
@@ -31,8 +35,8 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation.campaign_folder import is_campaign
 from burg_drake.evaluation.candidates import without_instance
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.executor import Executor, LocalExecutor, kept_workers
+from burg_drake.evaluation.cascade import evaluate, executor_for
+from burg_drake.evaluation.executor import Executor, LocalExecutor, keep_workers
 from burg_drake.evaluation.grasp_sets.input import run_grasps
 from burg_drake.evaluation.judge import require_device
 from burg_drake.evaluation.run_folder import RUN_FILE, Run
@@ -142,21 +146,21 @@ def label_library(
     request = RunRequest.of(station, settings)
     scenes = _LabelledScenes(library, station, settings.protocol, folder)
     runs = {name: scenes.run_folder(name) for name in names}
-    new = {name for name, run_folder in runs.items() if not (run_folder / RUN_FILE).exists()}
-    if executor is None and new:
+    new = [name for name, run_folder in runs.items() if not (run_folder / RUN_FILE).exists()]
+    executor = executor_for(executor, workers, settings)
+    request = replace(request, local=isinstance(executor, LocalExecutor))
+    if request.local and new:
         require_device(as_engine(settings.engine), settings.device)
     ensure_writable_folder(folder)
     with ExitStack() as stack:
-        if executor is None:
-            local = LocalExecutor.of_this_machine(workers)
-            executor, workers = stack.enter_context(kept_workers(local)), None
-        request = replace(request, local=isinstance(executor, LocalExecutor))
-        to_sample = [name for name in runs if name in new] if grasps is None else []
-        ahead = stack.enter_context(_SampledAhead(scenes, request, executor.workers, to_sample))
+        if isinstance(executor, LocalExecutor):
+            executor = stack.enter_context(keep_workers(executor))
+        sampled = new if grasps is None else []
+        sampling = stack.enter_context(_RunSampling(scenes, request, executor.workers, sampled))
         for name, run_folder in runs.items():
-            ahead.wait_for(name)
             given = None if grasps is None else _grasps_of(grasps, name)
             try:
+                sampling.wait_for(name, progress)
                 run = evaluate(
                     scenes.scene(name),
                     station,
@@ -164,7 +168,6 @@ def label_library(
                     grasps=given,
                     settings=settings,
                     executor=executor,
-                    workers=workers,
                     progress=progress,
                 )
                 found = _write_labels(name, run, target, station, folder)
@@ -222,9 +225,8 @@ class _LabelledScenes:
         return scene
 
 
-class _SampledAhead:
-    """Samples grasps of objects while those of others are judged; a context that ends the
-    processes."""
+class _RunSampling:
+    """Samples the grasps of new runs while others are judged; a context that ends the processes."""
 
     def __init__(
         self, scenes: _LabelledScenes, request: RunRequest, workers: int, names: Sequence[str]
@@ -237,28 +239,40 @@ class _SampledAhead:
             workers: number of workers that judge.
             names: objects with new runs, in the order in which they are waited for.
         """
-        self._scenes, self._begun = scenes, deque[str]()
+        self._scenes, self._submitted = scenes, deque[str]()
         count = preparer_count(workers, request.engine)
         self._pool = WorkerPool(count, retries=0, own_group=True)
-        has_others = len(names) > 1 and (workers > 1 or request.engine.parallel)
-        tasks = self._tasks(names if has_others else ())
+        is_useful = len(names) > 1 and (workers > 1 or request.engine.parallel)
+        tasks = self._tasks(names if is_useful else ())
         self._prepared = prepare_ahead(self._pool, request, tasks)
 
     def _tasks(self, names: Sequence[str]) -> Iterator[PrepareTask]:
         for name in names:
             with suppress(BurgError):  # raised again when its turn comes
                 scene = self._scenes.scene(name)
-                self._begun.append(name)
+                self._submitted.append(name)
                 yield PrepareTask(name, self._scenes.run_folder(name), scene)
 
-    def wait_for(self, name: str) -> None:
-        """Waits until the run of an object is sampled, if it was begun; errors come later."""
-        self._prepared.ready()  # begins more
-        if self._begun and self._begun[0] == name:
-            self._begun.popleft()
-            self._prepared.take()
+    def wait_for(self, name: str, progress: bool | Listener) -> None:
+        """Waits until the run of an object is sampled, if that has begun.
 
-    def __enter__(self) -> _SampledAhead:
+        Most errors are left to `evaluate`, which raises them again.
+
+        Raises:
+            SimulationError: the process that sampled it has died.
+        """
+        ready = self._prepared.ready()  # begins more
+        if not self._submitted or self._submitted[0] != name:
+            return
+        self._submitted.popleft()
+        with Reporter(progress) as reporter:
+            if not ready:
+                reporter.show(Progress("sampling"))
+            taken = self._prepared.take()
+        if taken is not None and isinstance(taken[1], WorkerDied):
+            raise SimulationError(f"its grasps cannot be sampled: {taken[1]}")
+
+    def __enter__(self) -> _RunSampling:
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -1,4 +1,4 @@
-"""Samples the grasps of a scene instance by instance in processes of its own.
+"""Samples the grasps of a scene in separate processes, instance by instance.
 
 An engine with parallel trials executes grasps faster than one process samples them, so those of the
 first instances are judged while others are sampled.
@@ -14,7 +14,9 @@ from burg_drake.core import (
     GraspSet,
     Prefetcher,
     Session,
+    SimulationError,
     Task,
+    WorkerDied,
     WorkerPool,
     default_workers,
 )
@@ -32,7 +34,8 @@ from burg_drake.station import Station
 def samples_in_parallel(scene: Scene, request: RunRequest) -> bool:
     """Whether grasps of a scene are sampled while others are judged.
 
-    Not where the grasps of a shard are chosen among all, or more are sampled later.
+    False for shards, whose grasps are chosen among all, and for balanced runs, which sample in
+    rounds.
     """
     settings = request.settings
     whole = request.grasps is None and request.shard is None and settings.until_balanced is None
@@ -69,10 +72,17 @@ class ParallelSampling:
         cpu: CPU time of the sampling so far [s].
     """
 
-    def __init__(self, scene: Scene, station: Station, document: RunDocument) -> None:
-        names = instances_to_sample(scene, document)
-        self._pool = WorkerPool(min(len(names), default_workers()), retries=0, own_group=True)
-        session = Session("sample", partial(InstanceSampler, scene, station, document))
+    def __init__(self, sampler: InstanceSampler, workers: int) -> None:
+        """Sets up the processes, which start when grasps are asked for.
+
+        Args:
+            sampler: samples the grasps of an instance.
+            workers: number of workers that judge.
+        """
+        names = instances_to_sample(sampler.scene, sampler.document)
+        count = max(1, min(len(names), workers, default_workers()))
+        self._pool = WorkerPool(count, retries=0, own_group=True)
+        session = Session("sample", partial(InstanceSampler, **vars(sampler)))
         self._prefetcher: Prefetcher[str, tuple[GraspSet, float]] = Prefetcher(
             self._pool, names, lambda name: Task(InstanceSampler.__call__, (name,), session=session)
         )
@@ -93,6 +103,11 @@ class ParallelSampling:
         if taken is None:
             return None
         name, found = taken
+        if isinstance(found, WorkerDied):
+            raise SimulationError(
+                f"the grasps of {name!r} cannot be sampled: {found}; the results so far are kept:"
+                " run the same command to continue"
+            ) from found
         if isinstance(found, BaseException):
             raise found
         self._parts[name], cpu = found

@@ -108,7 +108,7 @@ class Run:
         """All grasps of the run.
 
         Raises:
-            InvalidInputError: the run was stopped, or is, while its grasps are sampled.
+            InvalidInputError: not all grasps are sampled yet.
         """
         if not self.is_sampled:
             raise InvalidInputError(

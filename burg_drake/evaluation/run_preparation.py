@@ -526,7 +526,7 @@ def open_run(
         run = load_run(folder)
         require_same_run(folder, run.document, document)
         write_copies(folder, scene, request.station)
-        if not run.is_sampled:  # killed while it sampled
+        if not run.is_sampled:  # killed while it sampled and judged
             if not sample:
                 return run
             before_sampling()
@@ -536,7 +536,7 @@ def open_run(
             return resample_run(run, run.document, scene, request.station)
         return run
     if candidates is None and not sample:
-        return create_run(folder, _expect_grasps(document, scene), scene, request.station)
+        return create_run(folder, _expected_document(document, scene), scene, request.station)
     if candidates is None:
         before_sampling()
         start = time.process_time()
@@ -569,7 +569,7 @@ def save_sampled(run: Run, scene: Scene, candidates: Candidates, cpu: float) -> 
     return save_run(Run(run.path, document).with_candidates(candidates))
 
 
-def _expect_grasps(document: RunDocument, scene: Scene) -> RunDocument:
+def _expected_document(document: RunDocument, scene: Scene) -> RunDocument:
     """The document of a run before its grasps are sampled, with the numbers that are expected."""
     each = document.grasps.per_object or 0
     names = instances_to_sample(scene, document)

@@ -21,6 +21,7 @@ from burg_drake.core import (
     Verdict,
     WorkerFuture,
     WorkerPool,
+    default_workers,
     ensure_writable_folder,
     remove_unfinished,
 )
@@ -263,8 +264,9 @@ class SceneResultsWriter:
 def preparer_count(workers: int, engine: Engine) -> int:
     """Number of processes that prepare scenes for so many workers that judge."""
     # One for 16 workers, as sampling takes about a thirtieth of the time of the trials; but longer
-    # than trials on a card. At least one, as a cluster may have no workers yet.
-    return max(1, -(-workers // (2 if engine.parallel else 16)))
+    # than trials on a card. At least one, as a cluster may have no workers yet; no more than this
+    # machine has processors, as a cluster may have many.
+    return max(1, min(default_workers(), -(-workers // (2 if engine.parallel else 16))))
 
 
 def prepare_ahead(

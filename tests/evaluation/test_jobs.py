@@ -29,7 +29,7 @@ from burg_drake.evaluation import (
     LocalExecutor,
     StationJudgeFactory,
     WorkerLimits,
-    kept_workers,
+    keep_workers,
 )
 from burg_drake.station import ENGINES
 
@@ -62,13 +62,28 @@ def test_jobs_share_the_processes_and_each_judge_is_built_once(
 @pytest.mark.parametrize("kept", [False, True])
 def test_processes_stay_for_the_next_call_where_they_are_kept(tmp_path: Path, kept: bool) -> None:
     log, executor = tmp_path / "built", LocalExecutor(1)
-    with kept_workers(executor) if kept else nullcontext(executor) as executor:
+    with keep_workers(executor) if kept else nullcontext(executor) as executor:
         for name in ("a", "b", "a"):
             job = Job(name, MakeAndTell(KnownJudge(), log, name), grasps(name, 3))
             assert len(list(executor.judge([job]))) == 3
     built = [line.split() for line in log.read_text().splitlines()]
     assert [name for name, _ in built] == (["a", "b"] if kept else ["a", "b", "a"])
     assert len({process for _, process in built}) == (1 if kept else 3)
+
+
+def test_a_job_that_becomes_ready_does_not_wait_for_another() -> None:
+    asked: list[str] = []
+
+    def jobs() -> Iterator[Job | None]:
+        for name in ("slow", "", "", "late"):
+            asked.append(name)
+            judge = KnownJudge(pause=2.0 if name == "slow" else 0.0)
+            yield Job(name, Make(judge), grasps(name, 1)) if name else None
+
+    judged = LocalExecutor(2).judge(jobs())
+    next(judged)
+    assert asked == ["slow", "", "", "late"]
+    judged.close()
 
 
 def test_jobs_are_asked_for_when_they_are_needed() -> None:

@@ -22,6 +22,7 @@ from burg_drake.core import (
 )
 from burg_drake.evaluation import (
     EvaluationSettings,
+    LocalExecutor,
     ObjectLabels,
     assess_robustness,
     evaluate,
@@ -121,6 +122,15 @@ def test_the_same_call_goes_on_where_it_stopped(
     with pytest.raises(InvalidInputError, match="; protocol is lift there, shake here"):
         next(label_library(library, station, out, settings=other, workers=1, progress=False))
     assert (out / "scenes" / "cube.yaml").read_text() == scene
+
+
+def test_an_executor_has_workers_of_its_own(
+    library: ObjectLibrary, station: Station, tmp_path: Path
+) -> None:
+    executor, out = LocalExecutor(1), tmp_path / "labels"
+    with pytest.raises(InvalidInputError, match="either workers or an executor"):
+        list(label_library(library, station, out, executor=executor, workers=2))
+    assert not out.exists()
 
 
 def test_grasps_of_the_next_objects_are_sampled_by_other_processes(

@@ -10,7 +10,7 @@ import pytest
 from asked import asked
 from inline_executor import Inline
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import BurgError, InvalidInputError
 from burg_drake.evaluation import (
     EvaluationSettings,
     LocalExecutor,
@@ -77,6 +77,31 @@ def test_a_run_that_is_stopped_while_it_samples_goes_on(
     assert run.document.grasps.content == expected.document.grasps.content
     assert [session.judged for session in run.document.stretches] == [3, 12]
     assert read_status(out).complete
+
+
+def test_an_instance_that_cannot_be_sampled_loses_no_verdicts(
+    expected: Run, scene: Scene, station: Station, tmp_path: Path
+) -> None:
+    out, mesh = tmp_path / "run", scene.library.path("bar/mesh.obj")
+    moved = mesh.rename(mesh.with_suffix(".away"))
+    with pytest.raises(BurgError, match=r"mesh\.obj"):
+        judged(scene, station, out, "mujoco-gpu")
+    assert not load_run(out).is_sampled
+    moved.rename(mesh)
+    executor = Inline()
+    run = judged(scene, station, out, "mujoco-gpu", executor=executor)
+    assert executor.judged == 5
+    assert run.document.grasps.content == expected.document.grasps.content
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "mujoco-gpu"])
+def test_a_device_that_is_not_there_leaves_no_folder(
+    scene: Scene, station: Station, tmp_path: Path, engine: str
+) -> None:
+    options = {"executor": LocalExecutor(1), "device": "cuda:9"}
+    with pytest.raises(InvalidInputError, match="device"):
+        judged(scene, station, tmp_path / "run", engine, **options)
+    assert not (tmp_path / "run").exists()
 
 
 def test_grasps_are_sampled_first_where_verdicts_depend_on_all(

@@ -99,7 +99,7 @@ def run_grasps_label(arguments: argparse.Namespace) -> int:
             progress=not arguments.quiet,
         )
         if arguments.rejudge is not None:
-            _settle_contested(label(), arguments, executor)
+            _settle_contested(list(label()), arguments, executor)
         for found in label():
             if found.path is not None:
                 of_format = options.format_title(output.format)
