@@ -2,34 +2,37 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.optimize import minimize
 
 from burg_drake.core import CONTESTED_CONFIDENCE, Array, Outcome, wilson_interval
-from burg_drake.simulation import MAX_LIMIT_DISTANCE, Curve, Curves, confidence_from_signs
+from burg_drake.simulation import (
+    MAX_LIMIT_DISTANCE,
+    Curve,
+    Curves,
+    Population,
+    confidence_from_signs,
+)
 
 KNOTS = (0.02, 0.25, 0.5, 0.75, 0.98)
 """Quantiles of a sign's values at which its curve bends."""
 OWN_KNOTS = {"limit": (0.0, 0.02, 0.05, 0.1, 0.2, MAX_LIMIT_DISTANCE)}
 """Values at which the curves of other signs bend."""
-RIDGE = 0.3
+RIDGE = 0.5
 """Weight of the curves' squares, against the logarithm of the likelihood of all grasps: a sign that
 tells little stays flat."""
-BINS = 10
-SURE = 0.95
-"""Verdicts with more confidence are to be confirmed by the oracle."""
-FEW = 20
-"""Verdicts of one kind; of fewer no curves are fitted."""
+BIN_EDGES = (0.0, 0.8, 0.9, 0.95, 1.0)
+"""Of confidence, for the report."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """An executed verdict, and who confirms it.
+    """An executed verdict, and how often the oracle confirms it.
 
     Attributes:
         engine: that gave it.
@@ -38,8 +41,8 @@ class Judged:
         kind: of the grasp, see `confidence_trials.Grasp`.
         outcome: by the engine.
         signs: of the verdict.
-        worlds: 1 where a perturbed world gives the same, else 0.
-        oracle: likewise; None if it was not asked.
+        confirmed: share of trials, each changed slightly, in which the oracle finds the target
+            held, or lost, as well.
     """
 
     engine: str
@@ -48,36 +51,37 @@ class Judged:
     kind: str
     outcome: Outcome
     signs: Mapping[str, float]
-    worlds: Sequence[float]
-    oracle: float | None
+    confirmed: float
 
     @property
-    def confirmed(self) -> float:
-        """Share of confirmations; the oracle counts as much as all worlds together."""
-        parts = [float(np.mean(self.worlds))] if self.worlds else []
-        parts += [] if self.oracle is None else [self.oracle]
-        return float(np.mean(parts)) if parts else math.nan
+    def confidence(self) -> float:
+        """What the package says."""
+        found = confidence_from_signs(self.engine, self.outcome, self.signs)
+        assert found is not None
+        return found
 
 
 Verdicts = Mapping[str, Sequence[Judged]]
 """By engine."""
 
 
-def fit_all(verdicts: Verdicts) -> str:
+def fit_all(verdicts: Verdicts, population: Population) -> str:
     """The calibration as JSON, fitted on the objects that are not held out."""
-    engines = {}
+    engines: dict[str, dict[str, object]] = {}
     for engine, found in verdicts.items():
-        engines[engine] = parts = {}
-        for kind in (True, False):
-            mine = [
-                v
-                for v in found
-                if not v.held_out and v.outcome.held is kind and math.isfinite(v.confirmed)
-            ]
-            if len(mine) >= FEW:
-                parts["held" if kind else "lost"] = as_json(fit(mine))
-    about = "fitted by benchmarks/confidence.py"
-    return json.dumps({"about": about, "engines": engines}, indent=1) + "\n"
+        # The same simulator with longer steps, for the engine that executes few grasps.
+        more = verdicts.get("standard", ()) if engine == "reference" else ()
+        fitted = [v for v in (*found, *more) if not v.held_out]
+        engines[engine] = {
+            name: as_json(fit([v for v in fitted if v.outcome.held is held]))
+            for name, held in (("held", True), ("lost", False))
+        }
+    content = {
+        "about": "fitted by benchmarks/confidence.py",
+        "population": asdict(population),
+        "engines": engines,
+    }
+    return json.dumps(content, indent=1) + "\n"
 
 
 def fit(verdicts: Sequence[Judged]) -> Curves:
@@ -123,69 +127,57 @@ def _hat(x: Array, knots: Array, k: int) -> Array:
 
 
 def print_report(verdicts: Verdicts) -> None:
-    """Prints how confidence and confirmations agree, by engine, on the objects of either half."""
+    """Prints how confidence and confirmations agree, by engine and bin of confidence."""
     for engine, found in verdicts.items():
-        for title, mine in (
-            ("fitted on", [v for v in found if not v.held_out]),
-            ("held out", [v for v in found if v.held_out]),
-            *(
-                (f"held out, {kind}", [v for v in found if v.held_out and v.kind == kind])
-                for kind in ("ordinary", "hard", "limit")
-            ),
-        ):
-            print_half(f"{engine}, {title}", mine)
+        for title, held_out in (("fitted on", False), ("held out", True)):
+            print_bins(f"{engine}, {title}", [v for v in found if v.held_out is held_out])
 
 
-def print_half(title: str, verdicts: Sequence[Judged]) -> None:
-    """The figures of some verdicts."""
-    said = [(v, confidence_from_signs(v.engine, v.outcome, v.signs)) for v in verdicts]
-    known = [(v, p) for v, p in said if p is not None]
-    if not known:
-        print(f"{title}: no verdict has a confidence")
-        return
-    p = np.array([p for _, p in known])
-    print(f"\n{title}: {len(known)} executed grasps of {len({v.object for v, _ in known})} objects")
-    print(f"  contested (below {CONTESTED_CONFIDENCE:g}): {np.mean(p < CONTESTED_CONFIDENCE):.1%}")
-    for who, ask in CONFIRMATIONS.items():
-        y = np.array([ask(v) for v, _ in known])
-        asked = np.isfinite(y)
-        if not asked.any():
-            continue
-        q, y = p[asked], y[asked]
-        print(
-            f"  {who:16} {len(y):5} grasps, confirmed {y.mean():.1%}, said {q.mean():.1%},"
-            f" calibration error {calibration_error(q, y):.3f}, Brier {np.mean((q - y) ** 2):.4f}"
-        )
-        sure = q > SURE
-        if sure.any():
-            n, k = int(sure.sum()), float(y[sure].sum())
-            low, high = wilson_interval(round(k), n)
-            print(f"    above {SURE:g}: {k / n:.1%} of {n} ({low:.1%} to {high:.1%})")
+def print_bins(title: str, verdicts: Sequence[Judged]) -> None:
+    """A line for each bin."""
+    said = np.array([v.confidence for v in verdicts])
+    contested = np.mean(said < CONTESTED_CONFIDENCE)
+    print(
+        f"\n{title}: {len(verdicts)} verdicts on {len({v.object for v in verdicts})} objects,"
+        f" {contested:.1%} contested (below {CONTESTED_CONFIDENCE:g})"
+    )
+    print(f"{'confidence':14} {'said':>7} {'confirmed':>9}  {'95 % interval':>16} {'of':>5}  error")
+    for low, high in itertools.pairwise(BIN_EDGES):
+        mine = [v for v, p in zip(verdicts, said, strict=True) if low <= p < high]
+        if mine:
+            one = summarize_bin(mine)
+            print(
+                f"{low:.2f} to {high:.2f}   {one.said:7.2%} {one.confirmed:9.2%}"
+                f"  {one.low:6.1%} to {one.high:6.1%} {one.count:5}  {one.error:.3f}"
+            )
 
 
-def _worlds(verdict: Judged) -> float:
-    return float(np.mean(verdict.worlds)) if verdict.worlds else math.nan
+@dataclass(frozen=True)
+class BinSummary:
+    """Verdicts with about the same confidence.
 
-
-def _oracle(verdict: Judged) -> float:
-    return math.nan if verdict.oracle is None else verdict.oracle
-
-
-CONFIRMATIONS: Mapping[str, Callable[[Judged], float]] = {
-    "worlds": _worlds,
-    "oracle": _oracle,
-    "both": lambda verdict: verdict.confirmed,
-}
-
-
-def calibration_error(p: Array, y: Array, bins: int = BINS) -> float:
-    """Expected calibration error over bins of as many verdicts each.
-
-    Args:
-        p: (N,) confidence.
-        y: (N,) shares of confirmations.
-        bins: their number.
+    Attributes:
+        count: number of verdicts.
+        said: their mean confidence.
+        confirmed: share that the oracle confirms.
+        low, high: 95 % interval of `confirmed`, Wilson's, as if each verdict were tried once.
     """
-    order = np.argsort(p, kind="stable")
-    parts = np.array_split(order, bins)
-    return float(sum(len(k) * abs(p[k].mean() - y[k].mean()) for k in parts if len(k)) / len(p))
+
+    count: int
+    said: float
+    confirmed: float
+    low: float
+    high: float
+
+    @property
+    def error(self) -> float:
+        """Difference of what was said and what was confirmed."""
+        return abs(self.said - self.confirmed)
+
+
+def summarize_bin(verdicts: Sequence[Judged]) -> BinSummary:
+    """What was said of some verdicts, and how many are confirmed."""
+    same = sum(v.confirmed for v in verdicts)
+    said = float(np.mean([v.confidence for v in verdicts]))
+    low, high = wilson_interval(round(same), len(verdicts))
+    return BinSummary(len(verdicts), said, same / len(verdicts), low, high)

@@ -1,4 +1,4 @@
-"""The reliability diagram: how often verdicts were confirmed, by what was said of them."""
+"""The reliability diagram: how often verdicts were confirmed, by their confidence."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from confidence_fit import CONFIRMATIONS, Judged, Verdicts
-
-from burg_drake.core import Array, wilson_interval
-from burg_drake.simulation import confidence_from_signs
+from confidence_fit import Judged, Verdicts, summarize_bin
 
 WIDTH, HEIGHT, GAP = 290, 290, 40
 LEFT, TOP, BOTTOM, RIGHT = 48, 62, 66, 16
 TICKS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
 LOW, HIGH = 0.4, 0.997
 """Range that is drawn; what is beyond is at the edge."""
-EDGES = (0.7, 0.85, 0.93, 0.96, 0.98, 0.99)
+EDGES = (0.8, 0.9, 0.95, 0.98)
 """Of confidence, between the bins."""
-SHOWN = {"worlds": "perturbed worlds", "oracle": "the oracle"}
+SHOWN = ("standard", "mujoco")
+"""Engines with a panel."""
 STYLE = """
 svg { font: 12px system-ui, sans-serif; }
 text { fill: #333; } .faint { fill: #777; } .title { font-weight: 600; }
@@ -31,14 +29,13 @@ text { fill: #333; } .faint { fill: #777; } .title { font-weight: 600; }
 """
 
 
-def reliability_diagram(verdicts: Verdicts, engine: str = "standard") -> str:
-    """The SVG's text: a panel for each kind of confirmation, of the objects that were held out.
+def reliability_diagram(verdicts: Verdicts) -> str:
+    """The SVG's text: a panel for each engine, of the objects that were held out.
 
     Args:
         verdicts: by engine.
-        engine: whose verdicts are drawn.
     """
-    mine = [v for v in verdicts[engine] if v.held_out]
+    engines = [engine for engine in SHOWN if engine in verdicts]
     width = LEFT + len(SHOWN) * (WIDTH + GAP) - GAP + RIGHT
     height = TOP + HEIGHT + BOTTOM
     parts = [
@@ -46,22 +43,19 @@ def reliability_diagram(verdicts: Verdicts, engine: str = "standard") -> str:
         ' aria-label="Reliability diagram of confidence">',
         f"<style>{STYLE}</style>",
         f'<rect class="page" width="{width}" height="{height}"/>',
-        _text(LEFT, 22, f"Confidence of engine {engine}, on objects it was not fitted on", "title"),
+        _text(LEFT, 22, "Verdicts that the independent model confirms, by confidence", "title"),
     ]
-    for k, (who, title) in enumerate(SHOWN.items()):
-        parts += _panel(LEFT + k * (WIDTH + GAP), mine, who, title)
+    for k, engine in enumerate(engines):
+        mine = [v for v in verdicts[engine] if v.held_out]
+        parts += _panel(LEFT + k * (WIDTH + GAP), mine, engine)
     return "\n".join([*parts, "</svg>\n"])
 
 
-def _panel(left: float, verdicts: Sequence[Judged], who: str, title: str) -> Iterator[str]:
+def _panel(left: float, verdicts: Sequence[Judged], engine: str) -> Iterator[str]:
     """One panel."""
-    said = np.array(
-        [confidence_from_signs(v.engine, v.outcome, v.signs) or math.nan for v in verdicts]
-    )
-    seen = np.array([CONFIRMATIONS[who](v) for v in verdicts])
-    known = np.isfinite(said) & np.isfinite(seen)
-    said, seen = said[known], seen[known]
-    yield _text(left, 46, f"confirmed by {title}, {len(said)} grasps", "faint")
+    objects = len({v.object for v in verdicts})
+    title = f"engine {engine}: {len(verdicts)} grasps, {objects} objects held out"
+    yield _text(left, 46, title, "faint")
     for tick in TICKS:
         x, y = left + _place(tick) * WIDTH, TOP + (1.0 - _place(tick)) * HEIGHT
         yield f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{TOP + HEIGHT}"/>'
@@ -69,25 +63,16 @@ def _panel(left: float, verdicts: Sequence[Judged], who: str, title: str) -> Ite
         yield _text(x, TOP + HEIGHT + 17, f"{tick:g}", "faint", "middle")
         yield _text(left - 6, y + 4, f"{tick:g}", "faint", "end")
     yield (f'<line class="one" x1="{left}" y1="{TOP + HEIGHT}" x2="{left + WIDTH}" y2="{TOP}"/>')
-    for p, share, low, high, count in _bins(said, seen):
-        x = left + _place(p) * WIDTH
-        y, y0, y1 = (TOP + (1.0 - _place(v)) * HEIGHT for v in (share, low, high))
+    place = np.searchsorted(EDGES, [v.confidence for v in verdicts])
+    for k in np.unique(place).tolist():
+        one = summarize_bin([v for v, own in zip(verdicts, place, strict=True) if own == k])
+        x = left + _place(one.said) * WIDTH
+        y, y0, y1 = (TOP + (1.0 - _place(v)) * HEIGHT for v in (one.confirmed, one.low, one.high))
         yield f'<line class="whisker" x1="{x:.1f}" x2="{x:.1f}" y1="{y0:.1f}" y2="{y1:.1f}"/>'
-        tip = f"said {p:.3f}, confirmed {share:.3f} of {count}"
+        tip = f"said {one.said:.3f}, confirmed {one.confirmed:.3f} of {one.count}"
         yield f'<circle class="mark" cx="{x:.1f}" cy="{y:.1f}" r="4"><title>{tip}</title></circle>'
     yield _text(left + WIDTH / 2, TOP + HEIGHT + 38, "confidence", "", "middle")
     yield _text(left + WIDTH / 2, TOP + HEIGHT + 56, "95 % intervals, Wilson's", "faint", "middle")
-
-
-def _bins(said: Array, seen: Array) -> Iterator[tuple[float, float, float, float, int]]:
-    """What was said, the share of confirmations with its interval, and the number, by bins."""
-    place = np.searchsorted(EDGES, said)
-    for k in range(len(EDGES) + 1):
-        part = np.flatnonzero(place == k)
-        if len(part):
-            share = float(seen[part].mean())
-            low, high = wilson_interval(round(share * len(part)), len(part))
-            yield float(said[part].mean()), share, low, high, len(part)
 
 
 def _place(share: float) -> float:

@@ -168,9 +168,10 @@ class TrialFindings:
             the link, as "panda_link5 vs shelf".
         reason: message of the failure, if the outcome alone is not clear.
         margins: margins of the outcome.
-        confidence: probability that trials with varied uncertain parameters agree whether the
-            target is held to the end; see `simulation.confidence`. None if no trial decided, or the
-            engine is not calibrated.
+        confidence: probability that an independent model of contact, with slightly different
+            friction and hand pose, finds the same: that the target is held to the end, or that it
+            is lost; see `simulation.confidence`. None if no trial decided, or the engine is not
+            calibrated.
         displacements: largest displacement of any point of every other free object from its start
             [m], by instance; 0 if nothing touched the object or its neighbours. Empty if no trial
             started or it failed.
@@ -203,7 +204,8 @@ class TrialFindings:
         default=None,
         metadata=NumberField(
             DIMENSIONLESS,
-            "probability that the same grasp, slightly perturbed, is held again or lost again",
+            "probability that an independent model of contact, with slightly different friction and"
+            " hand pose, also finds the object held, or lost",
         ).metadata,
     )
     displacements: Mapping[str, float] = field(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -15,6 +16,7 @@ from burg_drake.core import (
     CPU_COLUMNS,
     DECIDED_STAGES,
     PUSHED_PREFIX,
+    BurgError,
     MarginNames,
     Outcome,
     Stage,
@@ -33,6 +35,7 @@ from burg_drake.evaluation.outcome_counts import (
     member_codes,
     stage_cost,
 )
+from burg_drake.evaluation.result_rows import ResultRows
 from burg_drake.evaluation.results_table import TextValues, contested_rows
 from burg_drake.evaluation.run_document import (
     CampaignDocument,
@@ -41,7 +44,10 @@ from burg_drake.evaluation.run_document import (
     one_by_one_text,
 )
 from burg_drake.evaluation.run_folder import Run
+from burg_drake.evaluation.table_parts import StoredRows
 from burg_drake.evaluation.trial_origin import protocol_of, read_motion
+from burg_drake.objects import ObjectEntry, load_library
+from burg_drake.simulation import Population
 from burg_drake.station import GraspMotion
 
 ARM_REMEDY = "try another station, or another place on the board; mode `hand` leaves the arm out"
@@ -60,7 +66,8 @@ def run_notes(run: Run) -> tuple[str, ...]:
     They name usual mistakes in given grasps, instances with fewer grasps than asked for or with
     none given, several devices, grasps that a card left to the CPU and, once its grasps are judged,
     each object without executed grasps, or with too few lifted or failing grasps for a balanced
-    run; and a lift or retreat on which most grasps fail.
+    run; a lift or retreat on which most grasps fail; and objects unlike those that confidence was
+    measured on.
     """
     grasps = run.document.grasps
     missing = ""
@@ -76,6 +83,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
         *_unexecuted_notes(run),
         *_motion_notes(run),
         *_balance_notes(run),
+        *_population_notes(run.rows(), [run.document.library.path]),
     )
 
 
@@ -99,6 +107,28 @@ def _device_notes(document: RunDocument | CampaignDocument) -> list[str]:
             f" rounding: {'; '.join(devices)}"
         )
     return notes
+
+
+def _population_notes(rows: ResultRows | StoredRows, libraries: Iterable[str]) -> list[str]:
+    """A note on the objects whose verdicts have a confidence that was not measured on such objects.
+
+    Args:
+        rows: rows of a run.
+        libraries: folders of its object libraries; those that are gone are left out.
+    """
+    object = rows.codes("object")
+    judged = np.unique(object.codes[np.isfinite(rows.column("confidence"))])
+    names = [object.names[code] for code in judged.tolist()]
+    entries: dict[str, ObjectEntry] = {}
+    for folder in libraries if names else ():
+        with contextlib.suppress(BurgError):
+            entries |= load_library(folder).objects
+    population = Population.of_calibration()
+    found = {
+        name: population.differences(entries[name]) for name in sorted(names) if name in entries
+    }
+    texts = [f"{name} ({', '.join(texts)})" for name, texts in found.items() if texts]
+    return [f"confidence was measured on {population}, unlike {list_names(texts)}"] if texts else []
 
 
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:
@@ -391,7 +421,7 @@ def summarize(run: Run | Campaign) -> Summary:
         lifts=count_short_lifts(
             table.column(MarginNames.lift_height), read_motion(document.trial).lift_height
         ),
-        notes=run_notes(run) if isinstance(run, Run) else _campaign_notes(run),
+        notes=run_notes(run) if isinstance(run, Run) else _campaign_notes(run, table),
         scenes=(() if isinstance(run, Run) else tuple(rows.count_groups(table.run, run.names))),
         knows_confidence=bool(np.isfinite(confidence).any()),
         settled_by=tuple(sorted(name for name in judges.names if name)),
@@ -469,10 +499,11 @@ class _CodedRows:
         ]
 
 
-def _campaign_notes(campaign: Campaign) -> tuple[str, ...]:
+def _campaign_notes(campaign: Campaign, rows: ResultRows | StoredRows) -> tuple[str, ...]:
     max_listed = 5  # Scenes with too few grasps that are listed with their notes.
     states, notes = campaign.states, [*campaign.document.hints]
     notes += _device_notes(campaign.document)
+    notes += _population_notes(rows, campaign.document.libraries)
     if empty := [n for n in campaign.names if n in states and states[n].state == "empty"]:
         notes.append(f"{len(empty)} scenes have no grasps to judge: {list_names(empty)}")
     if failed := list(campaign.failed):

@@ -113,6 +113,7 @@ from .trial_result import (
     Curves as Curves,
     GripLoad as GripLoad,
     Margins as Margins,
+    Population as Population,
     TrialResult as TrialResult,
     calibration as calibration,
     confidence as confidence,

@@ -190,10 +190,9 @@ class GraspTrial(ABC, Generic[W]):
                 found = begin(world).run()
             margins = replace(found.margins, clearance=screen.clearance)
             load = self.grip_load(instance, X_WG, friction=friction, mass=mass)
-            since_grip = replace(margins, end_time=margins.end_time - found.grip_start)
             trust = None
             if self.settings.shake is None:
-                trust = confidence(self.engine, found.outcome, since_grip, load)
+                trust = confidence(self.engine, found.outcome, margins, load)
             return replace(found, margins=margins, confidence=trust)
         except self.failures as error:
             world.invalidate()

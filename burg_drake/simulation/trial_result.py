@@ -2,10 +2,10 @@
 
 The confidence is an additive logistic model of the margins and the load on the grip.
 
-Confidence is the probability that trials with other friction, hand pose, object size or lift time,
-and an independent oracle, agree whether the target is held. Each engine has curves for held and for
-lost targets. `benchmarks/confidence.py` fits them on some objects, writes `calibration.json`, and
-tests them on the others.
+Confidence is the probability that an independent model of contact, with slightly different friction
+and hand pose, finds the same: that the target is held to the end, or that it is lost. Each engine
+has curves for held and for lost targets. `benchmarks/confidence.py` fits them on some objects,
+writes `calibration.json`, and tests them on others. `Population` has the range of these objects.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from burg_drake.core import Array, Margins as Margins, Outcome, TrialFindings
 from burg_drake.grasping import Clearance
+from burg_drake.objects import ObjectEntry
 from burg_drake.station import ENGINES, Engine
 
 
@@ -147,16 +149,14 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
     """Inputs of the confidence model, by name; logarithms are to base 10.
 
     Args:
-        margins: margins of a trial, with the end time counted from the fingers' contact.
+        margins: margins of a trial.
         load: load on its grip.
 
     Returns:
         `carried`, `turned`: logarithms of the ratios of load to friction limit; `limit`: see
         `GripLoad.limit`; `slip`, `tilt`: logarithms of the motion in the hand [m, rad];
-        `pad_force`: share of the weaker pad's force in that of the hand; `patch_area`: square root
-        [m]; `lift`: distance of the target along the hand's path [m]; `end_time`: time of the
-        decision after the fingers met the target [s]. Values that were not measured, for lack of a
-        grip, are 0.
+        `patch_area`: square root [m]; `lift`: distance of the target along the hand's path [m].
+        Values that were not measured, for lack of a grip, are 0.
     """
 
     min_slip = 1e-7  # Metres. Below this the target sticks.
@@ -171,15 +171,13 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
         "limit": load.limit,
         "slip": math.log10(max(measured(margins.slip), min_slip)),
         "tilt": math.log10(max(measured(margins.tilt), min_tilt)),
-        "pad_force": measured(margins.pad_force) / load.force,
         "patch_area": math.sqrt(measured(margins.patch_area)),
         "lift": measured(margins.lift),
-        "end_time": measured(margins.end_time),
     }
 
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
-"""Curves that `benchmarks/confidence.py` has fitted."""
+"""Curves that `benchmarks/confidence.py` has fitted, and the population they were fitted on."""
 OUTCOMES_WITHOUT_VERDICT = (Outcome.SIMULATION_FAILED,)
 """Outcomes without a verdict, for which confidence has no meaning."""
 
@@ -217,7 +215,7 @@ def confidence(engine: Engine, outcome: Outcome, margins: Margins, load: GripLoa
     Args:
         engine: engine of the trial.
         outcome: outcome of the trial.
-        margins: margins of the trial, with the end time counted from the fingers' contact.
+        margins: margins of the trial.
         load: load on its grip.
 
     Returns:
@@ -249,12 +247,64 @@ def confidence_from_signs(
 @cache
 def calibration() -> Mapping[tuple[str, bool], Curves]:
     """The curves, by name of the engine and whether the target is held to the end."""
-    content = json.loads(CALIBRATION_FILE.read_text(encoding="utf-8"))
     return {
         (engine, held == "held"): {
             sign: Curve(tuple(curve["knots"]), tuple(curve["logits"]))
             for sign, curve in curves.items()
         }
-        for engine, parts in content["engines"].items()
+        for engine, parts in _calibration_document()["engines"].items()
         for held, curves in parts.items()
     }
+
+
+@cache
+def _calibration_document() -> Mapping[str, Any]:
+    content: Mapping[str, Any] = json.loads(CALIBRATION_FILE.read_text(encoding="utf-8"))
+    return content
+
+
+@dataclass(frozen=True, kw_only=True)
+class Population:
+    """Range of the objects that confidence was fitted on; extents are along the axes of O.
+
+    Attributes:
+        objects: number of objects.
+        max_mass: mass of the heaviest object [kg].
+        min_thickness: smallest extent of the thinnest object [m].
+        min_length: largest extent of the smallest object [m].
+        max_length: largest extent of the longest object [m].
+    """
+
+    objects: int
+    max_mass: float
+    min_thickness: float
+    min_length: float
+    max_length: float
+
+    @classmethod
+    def of_calibration(cls) -> Population:
+        """The population of the calibration."""
+        return cls(**_calibration_document()["population"])
+
+    def __str__(self) -> str:
+        return (
+            f"objects of up to {self.max_mass:.3g} kg that are at least"
+            f" {_millimetres(self.min_thickness)} thick and {1e3 * self.min_length:.3g} to"
+            f" {_millimetres(self.max_length)} long"
+        )
+
+    def differences(self, entry: ObjectEntry) -> list[str]:
+        """How an object is unlike all of these, such as `3.2 kg is heavier`; empty if it is not."""
+        extents = [high - low for low, high in zip(entry.lower, entry.upper, strict=True)]
+        thickness, length = min(extents), max(extents)
+        found = [
+            (entry.mass > self.max_mass, f"{entry.mass:.3g} kg is heavier"),
+            (thickness < self.min_thickness, f"{_millimetres(thickness)} is thinner"),
+            (length < self.min_length, f"{_millimetres(length)} is shorter"),
+            (length > self.max_length, f"{_millimetres(length)} is longer"),
+        ]
+        return [text for is_outside, text in found if is_outside]
+
+
+def _millimetres(length: float) -> str:
+    return f"{round(1e3 * length, 1):g} mm"

@@ -9,13 +9,18 @@ from pathlib import Path
 
 import pytest
 from asked import asked
+from inline_executor import Inline
+from known_many import run_all, write_scenes
 from rich.console import Console
 
 from burg_drake.core import Outcome
 from burg_drake.evaluation import (
+    Run,
     SamplingSettings,
     evaluate,
+    load_campaign,
     load_run,
+    run_notes,
     sample_grasps,
     scored_set,
     shortfall_note,
@@ -25,7 +30,7 @@ from burg_drake.evaluation import (
 from burg_drake.grasping import antipodal_sampling
 from burg_drake.objects import load_library
 from burg_drake.scene import load_scene
-from burg_drake.station import load_station
+from burg_drake.station import Station, load_station
 
 
 def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
@@ -86,3 +91,48 @@ def test_a_margin_that_leaves_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -
         r" open hand comes within 200 mm of the object itself in \1; a smaller margin would help",
         note,
     )
+
+
+def make_heavy(library: Path) -> None:
+    """Gives the cube, which comes first, 3.2 kg, and the bar 0.1 kg as before."""
+    file = library / "library.yaml"
+    file.write_text(file.read_text().replace("mass: 0.1", "mass: 3.2", 1))
+    assert load_library(library).entry("bar").mass == 0.1
+
+
+HEAVY_NOTE = re.compile(
+    r"confidence was measured on objects of up to \S+ kg .* mm long, unlike cube \(3\.2 kg is"
+    r" heavier\)"
+)
+
+
+def test_confidence_in_verdicts_on_other_objects_is_said(own_run: Run) -> None:
+    assert not any("confidence" in note for note in run_notes(own_run))
+    make_heavy(own_run.path.parent / "shapes")
+    assert any(HEAVY_NOTE.fullmatch(note) for note in run_notes(load_run(own_run.path)))
+    assert any(HEAVY_NOTE.fullmatch(note) for note in summarize(own_run).notes)
+    (own_run.path.parent / "shapes/library.yaml").unlink()
+    assert not any("confidence" in note for note in run_notes(load_run(own_run.path)))
+
+
+def test_verdicts_without_confidence_are_not_told_about(
+    own_run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("known_judge.confidence", lambda id: None)
+    folder = own_run.path.with_name("other")
+    make_heavy(own_run.path.parent / "shapes")
+    scene, station = own_run.path.parent / "three.yaml", own_run.station()
+    options = {"grasps_per_object": 10, "blind": True, "progress": False, "executor": Inline()}
+    run = evaluate(scene, station, folder, **asked(**options))
+    assert summarize(run).total.executed
+    assert not any("confidence" in note for note in run_notes(run))
+
+
+def test_of_many_scenes_it_is_said_once(
+    tmp_path: Path, station: Station, known_judge: None
+) -> None:
+    campaign = run_all(write_scenes(tmp_path), station, tmp_path / "all", grasps_per_object=20)
+    assert not any("confidence" in note for note in summarize(campaign).notes)
+    make_heavy(tmp_path / "shapes")
+    notes = summarize(load_campaign(campaign.path)).notes
+    assert sum(bool(HEAVY_NOTE.fullmatch(note)) for note in notes) == 1

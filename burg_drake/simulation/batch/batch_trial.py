@@ -402,7 +402,6 @@ class _Batch:
             end_time=time,
             pushed=max(pushed.values(), default=np.nan),
         )
-        grip_start = float(ends.grip_check[k]) * check_time
         load = GripLoad.of(
             self._X_WG[row],
             self._p_WCm,
@@ -411,14 +410,11 @@ class _Batch:
             mass=float(self._loads.mass[row]),
             acceleration=settings.acceleration,
         )
-        since_grip = replace(margins, end_time=time - grip_start)
         return TrialResult(
             outcome=outcome,
-            grip_start=grip_start,
+            grip_start=float(ends.grip_check[k]) * check_time,
             margins=margins,
-            confidence=None
-            if settings.shake
-            else confidence(trial.engine, outcome, since_grip, load),
+            confidence=None if settings.shake else confidence(trial.engine, outcome, margins, load),
             blocker=world.body_names[BodyIndex(int(ends.blocker[k]))]
             if outcome is Outcome.BLOCKED
             else "",
