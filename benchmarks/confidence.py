@@ -5,7 +5,7 @@
 
 Confidence is the probability that the oracle, an independent model of contact, finds the same:
 that the object is held to the end, or that it is lost. The oracle does not get the same trial but
-three that a laboratory can hardly tell from it: with friction 5 % other, and the hand half a
+two that a laboratory can hardly tell from it: with friction 5 % other, and the hand half a
 millimetre and half a degree off (standard deviations).
 
 The 78 objects are those of `oracle.strangers`, of which every second is held out, and of
@@ -46,7 +46,7 @@ from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.simulation import CALIBRATION_FILE, Population, grip_signs
 from burg_drake.station import ENGINES
 
-ORACLE = ("oracle 0", "oracle 1", "oracle 2")
+ORACLE = ("oracle 0", "oracle 1")
 """Labels of the oracle's trials."""
 SERIAL = tuple(name for name, engine in ENGINES.items() if not engine.parallel)
 """Engines with curves of their own; those in parallel use the curves of these."""
