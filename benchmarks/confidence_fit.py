@@ -23,7 +23,7 @@ KNOTS = (0.02, 0.25, 0.5, 0.75, 0.98)
 """Quantiles of a sign's values at which its curve bends."""
 OWN_KNOTS = {"limit": (0.0, 0.02, 0.05, 0.1, 0.2, MAX_LIMIT_DISTANCE)}
 """Values at which the curves of other signs bend."""
-RIDGE = 0.5
+RIDGE = 0.2
 """Weight of the curves' squares, against the logarithm of the likelihood of all grasps: a sign that
 tells little stays flat."""
 BIN_EDGES = (0.0, 0.8, 0.9, 0.95, 1.0)
