@@ -128,7 +128,9 @@ def _population_notes(rows: ResultRows | StoredRows, libraries: Iterable[str]) -
         name: population.differences(entries[name]) for name in sorted(names) if name in entries
     }
     texts = [f"{name} ({', '.join(texts)})" for name, texts in found.items() if texts]
-    return [f"confidence was measured on {population}, unlike {list_names(texts)}"] if texts else []
+    if not texts:
+        return []
+    return [f"confidence may be wrong for {list_names(texts)}; it was measured on {population}"]
 
 
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:

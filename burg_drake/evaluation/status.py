@@ -37,6 +37,7 @@ class Status:
         left: expected remaining time [s]; None if unknown.
         last: date of the last verdict, seconds since 1970; None if there is none.
         shard: shard of the run, as `K/N`; empty for all.
+        sampled: whether all grasps of a run of one scene are known.
         scenes, done: number of scenes, and of finished scenes.
         failed: scenes that could not be judged, with the reason of each.
         under_way: scenes in progress.
@@ -52,6 +53,7 @@ class Status:
     left: float | None = None
     last: float | None = None
     shard: str = ""
+    sampled: bool = True
     scenes: int = 1
     done: int = 0
     failed: dict[str, str] = field(default_factory=dict)
@@ -96,6 +98,7 @@ class RunWatch:
         )
         done = judged == total and result.is_sampled
         under_way = () if done else (document.scene.name,)
+        status = replace(status, sampled=result.is_sampled)
         return replace(status, kind="run", done=int(done), under_way=under_way)
 
     def _look_at_scenes(self, campaign: Campaign) -> Status:

@@ -110,7 +110,7 @@ def _certainty_table(summary: Summary) -> TextTable:
         numbers = [group.executed, group.surely_lifted, group.surely_lost, group.contested]
         table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
     table.caption = (
-        "lifted, failed: the simulation is sure of it\n"
+        "lifted, failed: grasps whose verdict is not contested\n"
         "contested: the simulation is not sure whether the object was held (confidence"
         f" below {CONTESTED_CONFIDENCE:g}); judging again with another engine can settle it"
     )

@@ -94,7 +94,8 @@ def _process_text(status: evaluation.Status) -> str:
         return f"at work{last}"
     if status.complete:
         return f"none, and nothing is left to do{last}"
-    return f"none; the same command continues{last}"
+    unsampled = "" if status.sampled else "; it was stopped while it sampled grasps"
+    return f"none; the same command continues{unsampled}{last}"
 
 
 def add_report_options(parser: options.Parser) -> None:
