@@ -277,7 +277,6 @@ class Execution:
         self._in_free_air = 0.0
         self._path_is_blocked = False
         self._left_to_go = 0.0
-        self._grip_start = 0.0
 
     def run(self) -> TrialResult:
         """Runs all phases.
@@ -312,16 +311,12 @@ class Execution:
     def close(self) -> Outcome | None:
         """Closes until the fingers rest; None if both then hold the target, else the outcome."""
         settings = self._settings
-        self._grip_start = before = self._world.time
         self._carrier.close()
-        slow_since, met = math.inf, False
+        slow_since = math.inf
         timeout = max(settings.close_timeout, 2.0 * self._world.hand_document.closing_time)
         timeout += self._world.time
         while self._world.time < timeout:
             now = self.advance()
-            if self.contact.any and not met:
-                self._grip_start, met = before, True
-            before = now
             if self._world.finger_speed() > settings.settled_speed:
                 slow_since = math.inf
             else:
@@ -521,7 +516,6 @@ class Execution:
         )
         return TrialResult(
             outcome=outcome,
-            grip_start=self._grip_start,
             margins=margins,
             blocker=self._blocker if outcome is Outcome.BLOCKED else "",
             displacements=self._motions_of_others(self._others_motion.farthest),

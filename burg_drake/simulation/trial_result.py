@@ -32,14 +32,11 @@ class TrialResult(TrialFindings):
     Attributes:
         outcome: why it ended.
         margins: margins that a trial measures, see `Margins.of_trial`.
-        grip_start: simulated time of the last contact check before the closing fingers met the
-            target [s].
         on_cpu: whether `BatchTrial` executed it one by one on the CPU.
     """
 
     outcome: Outcome
     margins: Margins
-    grip_start: float = 0.0
     on_cpu: bool = False
 
 

@@ -412,7 +412,6 @@ class _Batch:
         )
         return TrialResult(
             outcome=outcome,
-            grip_start=float(ends.grip_check[k]) * check_time,
             margins=margins,
             confidence=None if settings.shake else confidence(trial.engine, outcome, margins, load),
             blocker=world.body_names[BodyIndex(int(ends.blocker[k]))]

@@ -148,7 +148,6 @@ class Trials:
         time: duration of the segments with the target [s].
         end: see `End`.
         check: number of the last check.
-        grip_check: number of the last check before a finger touched the target.
         slip, tilt: motion in the hand since the grip; below 0 without a grip.
         force: of each pad along the closing axis [N].
         spheres: number of spheres of each pad in contact.
@@ -177,7 +176,6 @@ class Trials:
     time: wp.array(dtype=float)
     end: wp.array(dtype=int)
     check: wp.array(dtype=int)
-    grip_check: wp.array(dtype=int)
     slip: wp.array(dtype=float)
     tilt: wp.array(dtype=float)
     force: wp.array(dtype=wp.vec2)

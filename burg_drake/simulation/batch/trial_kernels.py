@@ -389,7 +389,6 @@ def judge_approach(
     if state.in_phase[w] == trials.checks[k.trial, 0] + 1:
         state.phase[w] = CLOSE
         state.in_phase[w] = 0
-        trials.grip_check[k.trial] = k.number
         for i in range(2):
             physics.ctrl[w, c.finger_servo[i]] = c.closing_speed[i]
     return int(End.RUNNING)
@@ -402,7 +401,6 @@ def judge_close(
     """Closes until the fingers rest."""
     if k.some and state.touched[w] == 0:
         state.touched[w] = 1
-        trials.grip_check[k.trial] = k.number - 1
     now = state.in_phase[w]
     speed = wp.max(
         wp.abs(physics.qvel[w, c.finger_dof[0]]), wp.abs(physics.qvel[w, c.finger_dof[1]])

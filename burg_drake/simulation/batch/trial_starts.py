@@ -88,7 +88,6 @@ class TrialEnds:
 
     end: Array
     check: Array
-    grip_check: Array
     slip: Array
     tilt: Array
     force: Array
